@@ -1,0 +1,204 @@
+"""Degrees of freedom: per joint, what may move and how far; coordinates q <-> local rotations.
+
+A joint is fixed, a sequence of hinges, or a ball with swing and twist limits (METHODS of section 7 in
+Unzueta et al. 2008). A free root moves as a ball and translates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.skeleton import frozen
+from sixpoint.errors import FigureError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SwingTwist:
+    """Limits of a ball joint: swing amplitude psi as a spline of the circumduction angle theta, and twist.
+
+    The joint's segment points along ``axis`` in the neutral pose. Its direction s under a local rotation
+    has psi = angle(s, axis) and theta = atan2(s . side, s . forward).
+
+    Attributes:
+        axis: (3,) neutral direction of the segment in the parent's anatomical frame.
+        forward: (3,) direction of theta = 0, perpendicular to ``axis``.
+        side: (3,) direction of theta = 90 degrees.
+        theta: (K,) knots of the spline, -pi ... pi [rad].
+        psi: (K,) largest swing at each knot [rad]; first and last are equal.
+        twist: (2,) least and largest twist about ``axis`` [rad].
+
+    Reference: Unzueta et al. 2008, section 7 and eq. 3.
+    """
+
+    axis: Array
+    forward: Array
+    side: Array
+    theta: Array
+    psi: Array
+    twist: Array
+
+    def __post_init__(self) -> None:
+        for name in ("axis", "forward", "side", "theta", "psi", "twist"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        theta, psi = self.theta, self.psi
+        if len(theta) < 3 or len(theta) != len(psi) or np.any(np.diff(theta) <= 0):
+            raise FigureError("a swing limit needs at least three knots with increasing theta")
+        if not (np.isclose(theta[0], -np.pi) and np.isclose(theta[-1], np.pi) and np.isclose(psi[0], psi[-1])):
+            raise FigureError("swing knots must run from -180 to 180 degrees and end as they begin")
+        if np.any(psi < 0) or np.any(psi > np.pi):
+            raise FigureError("swing limits must lie between 0 and 180 degrees")
+        if not self.twist[0] <= 0 <= self.twist[1]:
+            raise FigureError("the twist range must contain the neutral pose (0 degrees)")
+
+    @cached_property
+    def spline(self) -> CubicSpline:
+        """psi_max(theta) before clipping to the range of the knots."""
+        t, p = self.theta, self.psi
+        slope = 0.5 * ((p[1] - p[0]) / (t[1] - t[0]) + (p[-1] - p[-2]) / (t[-1] - t[-2]))  # eq. 3
+        return CubicSpline(t, p, bc_type=((1, slope), (1, slope)))
+
+    def compute_limit(self, theta: ArrayLike) -> Array:
+        """Largest swing [rad] at circumduction angles [rad]; a cubic overshoots, so it is clipped to its knots."""
+        return np.asarray(np.clip(self.spline(theta), self.psi.min(), self.psi.max()), float)
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A joint that keeps its neutral rotation."""
+
+    size = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Hinges:
+    """One to three hinges in sequence: R = Rot(axes[0], q[0]) Rot(axes[1], q[1]) ...
+
+    Attributes:
+        axes: (k, 3) unit axes in the joint's rest frame.
+        lower: (k,) least angles [rad].
+        upper: (k,) largest angles [rad].
+    """
+
+    axes: Array
+    lower: Array
+    upper: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", frozen(np.reshape(self.axes, (-1, 3))))
+        object.__setattr__(self, "lower", frozen(np.atleast_1d(self.lower)))
+        object.__setattr__(self, "upper", frozen(np.atleast_1d(self.upper)))
+        if not 1 <= self.size <= 3:
+            raise FigureError(f"a joint has one to three hinges, got {self.size}")
+        if self.lower.shape != (self.size,) or self.upper.shape != (self.size,):
+            raise FigureError("each hinge needs a lower and an upper limit")
+        if np.any(self.lower > self.upper):
+            raise FigureError("a hinge's lower limit is above its upper limit")
+        if not np.allclose(np.linalg.norm(self.axes, axis=1), 1.0, atol=1e-6):
+            raise FigureError("hinge axes must have unit length")
+        if np.any(np.abs(np.sum(self.axes[1:] * self.axes[:-1], axis=1)) > 1e-6):
+            raise FigureError("consecutive hinge axes of one joint must be perpendicular")
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """A ball joint; its coordinates are a rotation vector. ``limit`` None means unlimited."""
+
+    limit: SwingTwist | None = None
+    size = 3
+
+
+JointDof = Fixed | Hinges | Ball
+
+
+@dataclass(frozen=True, eq=False)
+class Dofs:
+    """The degrees of freedom of a skeleton's joints.
+
+    Attributes:
+        joints: Joint index -> what it may do. Joints not listed are fixed in a figure, undeclared in a file.
+        free_root: Whether the root also translates.
+    """
+
+    joints: Mapping[int, JointDof] = field(default_factory=dict)
+    free_root: bool = True
+
+    @classmethod
+    def undeclared(cls) -> Dofs:
+        """What a file without degrees of freedom (BVH) says."""
+        return cls({})
+
+    def __getitem__(self, joint: int) -> JointDof:
+        return self.joints.get(joint, Fixed())
+
+    @cached_property
+    def starts(self) -> dict[int, int]:
+        """First coordinate of each joint that moves."""
+        starts, total = {}, 0
+        for joint in sorted(self.joints):
+            if self[joint].size:
+                starts[joint] = total
+                total += self[joint].size
+        return starts
+
+    @property
+    def size(self) -> int:
+        """Number of rotational coordinates."""
+        return sum(dof.size for dof in self.joints.values())
+
+    def compute_rotations(self, q: ArrayLike, joints: int) -> Array:
+        """Coordinates (n,) [rad] -> local rotations (joints, 4) from the neutral pose."""
+        q = np.asarray(q, float)
+        if q.shape != (self.size,):
+            raise FigureError(f"q must have {self.size} coordinates, got {q.shape}")
+        out = np.tile(rot.IDENTITY, (joints, 1))
+        for joint, start in self.starts.items():
+            dof = self[joint]
+            values = q[start : start + dof.size]
+            if isinstance(dof, Hinges):
+                for axis, value in zip(dof.axes, values, strict=True):
+                    out[joint] = rot.mul(out[joint], rot.from_axis_angle(axis, value))
+            else:
+                out[joint] = Rotation.from_rotvec(values).as_quat()
+        return out
+
+    def compute_coordinates(self, rotations: ArrayLike) -> Array:
+        """Local rotations (J, 4) from the neutral pose -> coordinates (n,) [rad].
+
+        What a joint's hinges cannot express is lost: one hinge keeps the twist about its axis, two
+        keep the first two angles of the decomposition along their axes.
+        """
+        rotations = np.asarray(rotations, float)
+        q = np.zeros(self.size)
+        for joint, start in self.starts.items():
+            dof = self[joint]
+            q[start : start + dof.size] = _coordinates(dof, rotations[joint])
+        return q
+
+
+def _coordinates(dof: JointDof, quat: Array) -> Array:
+    if isinstance(dof, Ball):
+        return np.asarray(Rotation.from_quat(quat).as_rotvec(), float)
+    assert isinstance(dof, Hinges)
+    if dof.size == 1:
+        twist = 2.0 * np.arctan2(float(quat[:3] @ dof.axes[0]), float(quat[3]))
+        return np.array([(twist + np.pi) % (2 * np.pi) - np.pi])
+    axes = dof.axes
+    if dof.size == 2:
+        axes = np.vstack([axes, np.cross(axes[0], axes[1])])
+    angles = Rotation.from_quat(quat).as_davenport(axes, "intrinsic", suppress_warnings=True)
+    return np.asarray(angles[: dof.size], float)
