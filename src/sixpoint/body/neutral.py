@@ -15,6 +15,7 @@ from sixpoint.body.dofs import Hinges
 from sixpoint.body.motion import Motion
 from sixpoint.body.roles import Roles
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.structure import foot_direction
 from sixpoint.errors import FigureError
 
 Array = NDArray[np.float64]
@@ -183,11 +184,11 @@ def _turn(neutral: Array, below: list[int], joint: int, axis: Array, bone: Array
 
 def _level_foot(skeleton: Skeleton, neutral: Array, ankle: int) -> None:
     """Point a foot forward where the rest pose does not: rigs whose rest has the foot along the shank."""
-    sites, children = skeleton.sites_of(ankle), skeleton.children[ankle]
-    bones = [*skeleton.offsets[list(children)], *skeleton.site_offsets[sites]]
-    bone = max(bones, key=lambda b: float(np.linalg.norm(b)), default=np.zeros(3))
-    foot = rot.unit(rot.mul_vec(neutral[ankle], bone))
-    if not foot.any() or foot @ Z > 0.5:
+    bone = foot_direction(skeleton, ankle)
+    if bone is None:
+        return
+    foot = rot.mul_vec(neutral[ankle], bone)
+    if foot @ Z > 0.5:
         return
     level = rot.unit(Z - 0.4 * Y)  # about the slope from ankle to toes
     below = [j for j in range(len(skeleton)) if skeleton.path(ankle, j)]

@@ -81,7 +81,7 @@ def _name_limbs(skeleton: Skeleton, legs: tuple[int, ...], arms: tuple[int, ...]
     positions, _ = skeleton.compute_transforms(np.tile(rot.IDENTITY, (len(skeleton), 1)))
     hips, ankles = [c[0] for c in chains[:2]], [c[2] for c in chains[:2]]
     up = positions[[c[0] for c in chains[2:]]].mean(axis=0) - positions[ankles].mean(axis=0)
-    feet = [bone for a in ankles for bone in [_foot(skeleton, a)] if bone is not None]
+    feet = [bone for a in ankles for bone in [foot_direction(skeleton, a)] if bone is not None]
     if not feet:
         return {}
     left = np.cross(up, np.sum(feet, axis=0))
@@ -109,8 +109,8 @@ def _limb_joints(skeleton: Skeleton, branch: int) -> list[int]:
     return joints[k : k + 3]
 
 
-def _foot(skeleton: Skeleton, ankle: int) -> Array | None:
-    """Direction from the ankle to the toes in the rest pose, if the rig has toes."""
+def foot_direction(skeleton: Skeleton, ankle: int) -> Array | None:
+    """Unit vector from the ankle to the toe tip in the ankle's frame at rest; None without toes."""
     chain = _longest_chain(skeleton, ankle)
     bone = np.sum([b for _, b in chain], axis=0) if chain else np.zeros(3)
     length = float(np.linalg.norm(bone))
