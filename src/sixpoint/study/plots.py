@@ -1,0 +1,315 @@
+"""Pictures of poses and errors: a film strip of mannequins, and curves under it.
+
+Bodies are drawn as tapered capsules in an orthographic view, far parts first. The truth is a soft grey body,
+the result a coloured skeleton on top of it, so that what differs sticks out. Works for any figure: only joints
+with roles are drawn. Uses Matplotlib's objects, never pyplot; files are written whole or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Polygon
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.figure import Figure
+from sixpoint.body.motion import Motion
+
+Array = NDArray[np.float64]
+
+INK, SOFT, GHOST = "#22303c", "#8793a0", "#d3d9df"
+LEFT, RIGHT, TRUNK = "#1f8a9e", "#e07a3f", "#44546a"
+SERIES = (LEFT, RIGHT, "#6b5ca5", "#5a9a4a", "#c14b6a", "#44546a", "#b8952f", "#8793a0")
+DPI = 150
+WIDTH = 1600 / DPI  # [inch]
+GAP = 0.16  # between the figures of a strip, in units of the figure
+VIEW_YAW, VIEW_PITCH = np.radians(38), np.radians(9)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The hull of some balls, all of one colour."""
+
+    centres: Array
+    radii: Array
+    colour: str
+
+
+def draw_comparison(
+    figure: Figure,
+    truth: Motion,
+    result: Motion,
+    path: str | Path,
+    *,
+    frames: Sequence[int] | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw a result over the truth at some frames, and the position error over time below.
+
+    Args:
+        figure: The figure of both motions.
+        truth: The recorded motion, drawn in grey.
+        result: The reconstructed motion, of the same length.
+        path: The PNG to write.
+        frames: Frames to show; by default six, spread over the clip.
+        title: By default the name of the truth.
+
+    Returns:
+        ``path``.
+    """
+    shown = _spread(len(truth)) if frames is None else list(frames)
+    canvas = _film(figure, (truth, result), shown, below=1.75)
+    error = 100 * compute_distances(figure, truth, result)
+    _heading(canvas, title or truth.name, f"mean {error.mean():.1f} cm,  worst {error.max():.1f} cm")
+    _legend(canvas)
+    height = canvas.get_figheight()
+    axes = canvas.add_axes((0.055, 0.5 / height, 0.925, 1.2 / height))
+    times = np.arange(len(truth)) / truth.rate
+    axes.fill_between(times, error, color=LEFT, alpha=0.13, lw=0)
+    axes.plot(times, error, color=LEFT, lw=1.8, solid_capstyle="round")
+    axes.axhline(error.mean(), color=INK, lw=0.9, ls=(0, (4, 3)))
+    axes.plot(times[shown], error[shown], "o", color=INK, ms=5, mec="white", mew=1.0, clip_on=False, zorder=5)
+    axes.set_ylim(0, max(1.12 * error.max(), 0.1))
+    _style(axes, times, "joint distance [cm]")
+    return _save(canvas, path)
+
+
+def draw_poses(
+    figure: Figure, motion: Motion, path: str | Path, frames: Sequence[int] | None = None, *, title: str | None = None
+) -> Path:
+    """Draw a film strip of one motion.
+
+    Args:
+        figure: The figure of the motion.
+        motion: What to draw.
+        path: The PNG to write.
+        frames: Frames to show; by default six, spread over the clip.
+        title: By default the name of the motion.
+
+    Returns:
+        ``path``.
+    """
+    shown = _spread(len(motion)) if frames is None else list(frames)
+    canvas = _film(figure, (motion,), shown, below=0.0)
+    _heading(canvas, title or motion.name, f"{motion.duration:.1f} s at {motion.rate:g} Hz")
+    return _save(canvas, path)
+
+
+def draw_error_curves(
+    curves: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    path: str | Path,
+    ylabel: str = "joint distance [cm]",
+    *,
+    title: str | None = None,
+) -> Path:
+    """Draw named curves over time [s] into one picture.
+
+    Args:
+        curves: Name -> (times [s], values).
+        path: The PNG to write.
+        ylabel: Quantity and unit of the values.
+        title: Printed above, if given.
+
+    Returns:
+        ``path``.
+    """
+    canvas = Canvas(figsize=(WIDTH, 4.0), dpi=DPI)
+    axes = canvas.add_axes((0.065, 0.14, 0.77, 0.74))
+    for k, (name, (times, values)) in enumerate(curves.items()):
+        axes.plot(times, values, color=SERIES[k % len(SERIES)], lw=1.8, ls=("-", "--")[k // len(SERIES) % 2], label=name)
+    ends = np.concatenate([np.asarray(times, float) for times, _ in curves.values()] or [np.array([0.0, 1.0])])
+    axes.set_ylim(bottom=0)
+    _style(axes, ends, ylabel)
+    if curves:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), frameon=False, labelcolor=INK, fontsize=9.5)
+    if title:
+        _heading(canvas, title, "")
+    return _save(canvas, path)
+
+
+def compute_distances(figure: Figure, truth: Motion, result: Motion) -> Array:
+    """Mean distance of the posed joints in each frame (F,) [m]."""
+    joints = _posed(figure)
+    return np.asarray(
+        np.linalg.norm(truth.positions[:, joints] - result.positions[:, joints], axis=-1).mean(axis=1), float
+    )
+
+
+def _posed(figure: Figure) -> list[int]:
+    r = figure.roles
+    limbs = (*r.clavicle, *r.shoulder, *r.elbow, *r.wrist, *r.hip, *r.knee, *r.ankle)
+    return sorted({r.pelvis, *r.spine, *limbs})
+
+
+def _tips(figure: Figure, joint: int) -> list[int]:
+    """Farthest joint or site below a joint, and its heel if it has one: rows of joints then sites."""
+    sk = figure.skeleton
+    below = [j for j in range(joint + 1, len(sk)) if sk.path(joint, j)]
+    sites = [len(sk) + s for s in range(len(sk.site_names)) if sk.site_parents[s] in (joint, *below)]
+    pose = figure.neutral_pose
+    places = _places(figure, *pose.compute_transforms())
+    found = sorted(below + sites, key=lambda k: -float(np.linalg.norm(places[k] - places[joint])))
+    heel = [k for k in sites if "heel" in sk.site_names[k - len(sk)].lower()]
+    return [k for k in found[:1] if np.linalg.norm(places[k] - places[joint]) > 0.02] + heel
+
+
+def _places(figure: Figure, positions: Array, world: Array) -> Array:
+    return np.concatenate([positions, figure.skeleton.compute_sites(positions, world)], axis=-2)
+
+
+def _parts(figure: Figure, positions: Array, world: Array, slim: bool) -> list[_Part]:
+    """A mannequin: capsules for limbs, hulls for the trunk, a ball for the head."""
+    r, unit = figure.roles, figure.height / 1.6
+    p = _places(figure, positions, world)
+    up = rot.mul(world[r.head], rot.inv(figure.neutral[r.head]))
+    lift = [0, 0.03, 0.01] if np.any(r.head_offset) else [0, 0.065, 0.02]
+    skull = p[r.head] + rot.mul_vec(world[r.head], r.head_offset) + rot.mul_vec(up, np.array(lift) * unit)
+    thin = 0.55 if slim else 1.0
+
+    def part(colour: str, centres: Sequence[Array], *radii: float) -> _Part:
+        return _Part(np.array(centres), np.array(radii) * unit * thin, colour)
+
+    trunk = [p[r.pelvis], *p[list(r.spine)]]
+    waist, chest = trunk[len(trunk) // 3], trunk[-3 if len(trunk) > 4 else -2]
+    parts = [part(TRUNK, [trunk[-1], chest], 0.048, 0.055)]
+    if slim:
+        parts += [part(TRUNK, pair, 0.05, 0.05) for pair in zip(trunk[:-1], trunk[1:], strict=True)]
+        parts += [part(TRUNK, [p[k], p[pair[1]]], 0.045, 0.045) for pair in (r.hip,) for k in pair[:1]]
+        parts += [part(TRUNK, [chest, p[k]], 0.045, 0.045) for k in r.shoulder]
+    else:
+        parts.append(part(TRUNK, [p[r.hip[0]], p[r.hip[1]], waist], 0.088, 0.088, 0.105))
+        parts.append(part(TRUNK, [p[r.shoulder[0]], p[r.shoulder[1]], waist, chest], 0.058, 0.058, 0.105, 0.09))
+    for k, colour in enumerate((LEFT, RIGHT)):
+        parts.append(part(colour, [p[r.hip[k]], p[r.knee[k]]], 0.08, 0.056))
+        parts.append(part(colour, [p[r.knee[k]], p[r.ankle[k]]], 0.054, 0.037))
+        parts.append(part(colour, [p[r.shoulder[k]], p[r.elbow[k]]], 0.05, 0.04))
+        parts.append(part(colour, [p[r.elbow[k]], p[r.wrist[k]]], 0.039, 0.028))
+        foot, hand = _tips(figure, r.ankle[k]), _tips(figure, r.wrist[k])
+        parts.append(part(colour, [p[r.ankle[k]], *p[foot]], 0.036, *[0.024] * len(foot)))
+        parts.append(part(colour, [p[r.wrist[k]], *p[hand]], 0.03, *[0.022] * len(hand)))
+    thin = 0.85 if slim else 1.0
+    return [*parts, part(TRUNK, [skull - 0.012 * unit * rot.mul_vec(up, [0, 1, 0]), skull], 0.085, 0.095)]
+
+
+def _camera(figure: Figure, motion: Motion, shown: Sequence[int]) -> Array:
+    """(3, 3) rows right, up and towards the viewer: three quarters from the front of the mean pose."""
+    across = motion.positions[shown][:, figure.roles.hip[0]] - motion.positions[shown][:, figure.roles.hip[1]]
+    front = np.cross(across.mean(axis=0), [0, 1, 0])
+    yaw = np.arctan2(front[0], front[2]) + VIEW_YAW
+    toward = np.array([np.sin(yaw) * np.cos(VIEW_PITCH), np.sin(VIEW_PITCH), np.cos(yaw) * np.cos(VIEW_PITCH)])
+    right = rot.unit(np.cross([0, 1, 0], toward))
+    return np.stack([right, np.cross(toward, right), toward])
+
+
+def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below: float) -> Canvas:
+    """Bodies side by side over their times, on a canvas that has ``below`` inches left at its foot."""
+    unit, first = figure.height / 1.6, motions[0]
+    camera = _camera(figure, first, shown)
+    places = _places(figure, *first.transforms)
+    floor = float(places[..., 1].min())
+    views = []
+    for frame in shown:
+        origin = np.array([*first.positions[frame, figure.roles.pelvis]]) * [1, 0, 1] + [0, floor, 0]
+        layers = []
+        for motion in motions:
+            positions, world = motion.transforms
+            parts = _parts(figure, positions[frame] - origin, world[frame], slim=motion is not first)
+            parts.sort(key=lambda part: float((part.centres @ camera[2]).mean()))
+            layers.append([(part.colour, _outline(part, camera)) for part in parts])
+        views.append((layers, (figure.targets(first.sliced(slice(frame, frame + 1))).positions[0] - origin) @ camera.T))
+    edges = [np.concatenate([o for layer in layers for _, o in layer]) for layers, _ in views]
+    widths = [max(float(np.ptp(e[:, 0])), 0.55 * unit) + GAP * unit for e in edges]
+    wide = max(sum(widths), 5.0 * unit)
+    low = min(-0.13 * unit, *(float(e[:, 1].min()) for e in edges)) - 0.14 * unit
+    high = max(float(e[:, 1].max()) for e in edges) + 0.06 * unit
+    tall = (high - low) / wide * WIDTH
+    canvas = Canvas(figsize=(WIDTH, round((tall + below + 0.62) * DPI) / DPI), dpi=DPI)
+    total = canvas.get_figheight()
+    axes = canvas.add_axes((0, below / total, 1, tall / total), xlim=(0, wide), ylim=(low, high))
+    axes.axis("off")
+    left = (wide - sum(widths)) / 2
+    for frame, (layers, points), edge, width in zip(shown, views, edges, widths, strict=True):
+        shift = np.array([left + (width - edge[:, 0].max() - edge[:, 0].min()) / 2, 0.0])
+        _draw_body(axes, layers, points[:, :2] + shift if len(motions) > 1 else None, shift, camera, unit)
+        axes.text(left + width / 2, low + 0.02 * unit, f"{frame / first.rate:.2f} s", ha="center", color=SOFT, size=9.5)
+        left += width
+    return canvas
+
+
+def _draw_body(
+    axes: Axes, layers: list[list[tuple[str, Array]]], points: Array | None, shift: Array, camera: Array, unit: float
+) -> None:
+    around = np.linspace(0, 2 * np.pi, 60)
+    disc = 0.36 * unit * np.stack([np.cos(around), np.zeros(60), np.sin(around)], axis=-1) @ camera.T
+    axes.add_patch(Polygon(disc[:, :2] + shift, fc="#f1f3f5", ec="none", zorder=0))
+    for k, layer in enumerate(layers):
+        ghost = k < len(layers) - 1
+        for colour, outline in layer:
+            style = {"fc": GHOST, "ec": GHOST, "lw": 0.4} if ghost else {"fc": colour, "ec": "white", "lw": 0.9}
+            axes.add_patch(Polygon(outline + shift, joinstyle="round", zorder=1 + k, **style))
+    if points is not None:
+        axes.plot(*points.T, "o", ms=5.2, color=INK, mec="white", mew=1.1, zorder=9)
+
+
+def _outline(part: _Part, camera: Array) -> Array:
+    """Hull (n, 2) of the part's balls as seen by the camera."""
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    flat = (part.centres @ camera.T)[:, None, :2] + part.radii[:, None, None] * circle
+    points = flat.reshape(-1, 2)
+    return np.asarray(points[ConvexHull(points).vertices], float)
+
+
+def _spread(frames: int, count: int = 6) -> list[int]:
+    """Frames in the middle of equal parts of a clip."""
+    return sorted({int((k + 0.5) * frames / count) for k in range(count)})
+
+
+def _heading(canvas: Canvas, title: str, note: str) -> None:
+    y = 1 - 0.36 / canvas.get_figheight()
+    canvas.text(0.02, y, title, size=15, weight="bold", color=INK, va="center")
+    canvas.text(0.98, y, note, size=10.5, color=INK, va="center", ha="right")
+
+
+def _legend(canvas: Canvas) -> None:
+    y = 1 - 0.66 / canvas.get_figheight()
+    x = 0.02
+    for colour, text in ((GHOST, "truth"), (LEFT, "result, left"), (RIGHT, "result, right"), (INK, "targets")):
+        canvas.text(x, y, "\u25cf", color=colour, size=11, va="center")
+        canvas.text(x + 0.014, y, text, color=SOFT, size=9.5, va="center")
+        x += 0.03 + 0.0082 * len(text)
+
+
+def _style(axes: Axes, times: Array, ylabel: str) -> None:
+    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
+    axes.set_xlabel("time [s]", color=SOFT, size=9.5, labelpad=2)
+    axes.set_ylabel(ylabel, color=SOFT, size=9.5)
+    axes.tick_params(colors=SOFT, labelsize=9, length=0)
+    axes.grid(axis="y", color="#e6eaee", lw=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[:].set_visible(False)
+    axes.spines["bottom"].set(visible=True, color="#c5ccd3")
+
+
+def _save(canvas: Canvas, path: str | Path) -> Path:
+    """Write a PNG beside its place, then move it there."""
+    path = Path(path)
+    handle, temporary = tempfile.mkstemp(suffix=".png", prefix=f".{path.stem}-", dir=path.parent)
+    os.close(handle)
+    try:
+        FigureCanvasAgg(canvas).print_png(temporary)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path
