@@ -51,6 +51,7 @@ def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = No
             "load the rig with a recording, or give it a T-pose, A-pose or arms-down rest pose"
         )
     neutral = np.array(neutral)
+    neutral[skeleton.path(0, roles.pelvis)[:-1]] = rot.IDENTITY  # what is above the pelvis stands still
     for limb, chain in enumerate(roles.limbs):
         _set_limb(skeleton, roles, neutral, limb, chain, motion, frames)
     return rot.normalised(neutral)

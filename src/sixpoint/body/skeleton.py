@@ -21,7 +21,11 @@ Index = NDArray[np.int64]
 
 
 def frozen(values: object, dtype: type = np.float64) -> NDArray[np.generic]:
-    """A C-contiguous, read-only copy."""
+    """A C-contiguous, read-only array: the given one if it is that already, else a copy."""
+    if isinstance(values, np.ndarray) and values.dtype == dtype and values.flags.c_contiguous:
+        owner = values if values.base is None else values.base
+        if not values.flags.writeable and not getattr(owner, "flags", values.flags).writeable:
+            return values
     array = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array

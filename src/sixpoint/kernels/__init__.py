@@ -1,0 +1,1 @@
+"""Compiled mathematics on plain arrays and tuples; imports nothing of the package but itself."""

@@ -1,0 +1,242 @@
+"""One frame of Sequential IK, in the order of the paper: pelvis, spine, legs, clavicles, arms.
+
+State between frames: ``local`` (rows, 4) are the anatomical local rotations of the posed joints and
+``memory`` (5, 3) holds the estimated X axis, the bending plane's normal, the positions of pelvis and
+head, and the flags (any frame yet, any bending plane yet, unused).
+
+Reference: Unzueta et al. 2008, Algorithm 1.
+"""
+
+from math import atan2, cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.sequential import spine
+from sixpoint.solvers.sequential.clavicle import solve_clavicle
+from sixpoint.solvers.sequential.limb import solve_limb
+from sixpoint.solvers.sequential.pelvis import estimate_x
+
+MEMORY_ROWS = 5
+FAR = 1e7  # m, a point farther away than this, or not a number, counts as lost
+CONVERGED, UNREACHABLE, LOST = 0, 1, 2
+REACHED = 0.01  # m, the paper's stop criterion (section 9)
+
+
+class Settings(NamedTuple):
+    """Options of the compiled solver; see ``SequentialIK``."""
+
+    w1: float
+    w2: float
+    w3: float
+    limits: bool
+    literal: bool
+    hold_clavicles: bool
+    align_pelvis: bool
+
+
+@helper
+def fill_lost(points, known, filled, local, memory, world, segs, model):
+    """Copy the points; a lost pelvis or head follows the other, or stays where it was.
+
+    Returns whether any of the six is lost.
+    """
+    lost = False
+    for i in range(6):
+        p = vec.load(points, i)
+        known[i] = abs(p[0]) < FAR and abs(p[1]) < FAR and abs(p[2]) < FAR  # false for NaN
+        if known[i]:
+            vec.store(filled, i, p)
+        else:
+            lost = True
+    if not (known[0] and known[1]):
+        has_state = memory[4, 0] > 0.0
+        neutral = (0.0, model.neutral_chord, 0.0)
+        chord = vec.sub(vec.load(memory, 3), vec.load(memory, 2)) if has_state else neutral
+        if known[1]:
+            vec.store(filled, 0, vec.sub(vec.load(filled, 1), chord))
+        elif known[0]:
+            vec.store(filled, 1, vec.add(vec.load(filled, 0), chord))
+        else:
+            vec.store(filled, 0, vec.load(memory, 2))
+            vec.store(filled, 1, vec.add(vec.load(memory, 2), chord))
+    return lost
+
+
+@helper
+def solve_trunk(model, settings, pelvis, head, x_estimated, local, memory, scratch):
+    """Pelvis and spine (Algorithm 2); returns the pelvis joint's position."""
+    world, segs, start, flat = scratch
+    goal = vec.sub(head, pelvis)
+    wanted = vec.norm(goal)
+    y = vec.unit(goal)
+    if memory[4, 0] == 0.0 or wanted >= model.neutral_chord:
+        # Nothing bent yet, or a stretch pose: the pelvis starts from its estimate.
+        z = vec.cross(x_estimated, y)
+        if vec.norm(z) > 0.5:
+            qt.store(local, 0, qt.from_axes(x_estimated, y, z))
+    spine.place_trunk(model, local, world, segs)
+    v, has_plane = spine.set_chord(
+        model, wanted, goal, settings, local, start, world, segs, flat,
+        vec.load(memory, 1), memory[4, 1] > 0.0,
+    )
+    vec.store(memory, 1, v)
+    memory[4, 1] = 1.0 if has_plane else 0.0
+    root = qt.load(local, 0)
+    # Line 14: the pelvis' X axis along the estimate. A half turn goes about its own Y.
+    turn = qt.arc(qt.x_axis(root), x_estimated, qt.y_axis(root))
+    if settings.limits:
+        spine.clamp_interior(model, local)  # line 15
+        spine.place_trunk(model, local, world, segs)
+    chord = spine.chord_of(segs)
+    length = vec.norm(chord)
+    if wanted > 1e-9 and length > 1e-9:  # line 16
+        turned = vec.unit(qt.mul_vec(turn, chord))
+        turn = qt.mul(qt.arc(turned, y, x_estimated), turn)
+        if settings.align_pelvis:  # optional: twist about the chord, X as near to the estimate as it gets
+            x = vec.reject(qt.x_axis(qt.mul(turn, root)), y)
+            half = 0.5 * atan2(vec.dot(vec.cross(x, x_estimated), y), vec.dot(x, x_estimated))
+            turn = qt.mul((sin(half) * y[0], sin(half) * y[1], sin(half) * y[2], cos(half)), turn)
+    qt.store(local, 0, qt.normalised(qt.mul(turn, root)))
+    spine.place_trunk(model, local, world, segs)
+    return vec.madd(pelvis, 0.5 * (wanted - length), y)  # line 17
+
+
+@helper
+def solve_one_limb(model, settings, limb, parent, place, target, local):
+    """Pose limb 0 to 3 (left arm, right arm, left leg, right leg); returns its end's position."""
+    base = model.segments.shape[0]
+    side = limb % 2
+    h = -1.0 if limb < 2 else 1.0
+    ball = base + (2 if limb < 2 else 6) + side
+    root, hinge, end = solve_limb(
+        qt.inv_mul_vec(parent, vec.sub(target, place)),
+        model.lengths[limb, 0], model.lengths[limb, 1], h,
+        settings.limits, model.balls, ball, model.hinges[limb, 0], model.hinges[limb, 1],
+    )
+    qt.store(local, ball, root)
+    qt.store(local, ball + 2, hinge)
+    return vec.add(place, qt.mul_vec(parent, end))
+
+
+@helper
+def solve_frame(model, settings, points, known, filled, local, memory, residual, scratch):
+    """Solve one frame; updates ``local``, ``memory`` and ``residual`` (6,) [m] in place.
+
+    Returns:
+        Status: CONVERGED, UNREACHABLE (a residual above 1 cm) or LOST (some point is unknown).
+    """
+    world, segs = scratch[0], scratch[1]
+    lost = fill_lost(points, known, filled, local, memory, world, segs, model)
+    pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
+    y = vec.sub(head, pelvis)
+    y = vec.unit(y) if vec.norm(y) > 1e-9 else qt.y_axis(qt.load(local, 0))
+    x = estimate_x(
+        filled, known, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3
+    )
+    root = solve_trunk(model, settings, pelvis, head, x, local, memory, scratch)
+    chord_end = vec.add(root, spine.chord_of(segs))
+    vec.store(memory, 0, x)
+    vec.store(memory, 2, root)
+    vec.store(memory, 3, chord_end)
+    memory[4, 0] = 1.0
+    residual[0] = vec.norm(vec.sub(pelvis, root)) if known[0] else 0.0
+    residual[1] = vec.norm(vec.sub(head, chord_end)) if known[1] else 0.0
+    for side in range(2):  # legs
+        frame = qt.load(world, 0)
+        place = vec.add(root, qt.mul_vec(frame, vec.load(model.hips, side)))
+        residual[4 + side] = 0.0
+        if known[4 + side]:
+            target = vec.load(filled, 4 + side)
+            end = solve_one_limb(model, settings, 2 + side, frame, place, target, local)
+            residual[4 + side] = vec.norm(vec.sub(target, end))
+    for side in range(2):  # clavicles and arms
+        residual[2 + side] = 0.0
+        if known[2 + side]:
+            target = vec.load(filled, 2 + side)
+            end = solve_arm(model, settings, side, root, target, world, segs, local)
+            residual[2 + side] = vec.norm(vec.sub(target, end))
+    if lost:
+        return LOST
+    for i in range(6):
+        if not residual[i] <= REACHED:
+            return UNREACHABLE
+    return CONVERGED
+
+
+@helper
+def solve_arm(model, settings, side, root, target, world, segs, local):
+    """Clavicle and arm of one side; returns the wrist's position."""
+    base = model.segments.shape[0]
+    chest = model.chest[side]
+    place = root
+    for k in range(chest):
+        place = vec.add(place, vec.load(segs, k))
+    frame = qt.load(world, chest)
+    joint = vec.add(place, qt.mul_vec(frame, vec.load(model.girdle, side)))
+    start = qt.load(local, base + side) if settings.hold_clavicles else qt.IDENTITY
+    clavicle = solve_clavicle(
+        start, vec.load(model.clavicles, side), qt.inv_mul_vec(frame, vec.sub(target, joint)),
+        model.lengths[side, 0] + model.lengths[side, 1], settings.limits, model.balls, base + side,
+    )
+    qt.store(local, base + side, clavicle)
+    frame = qt.mul(frame, clavicle)
+    shoulder = vec.add(joint, qt.mul_vec(frame, vec.load(model.clavicles, side)))
+    return solve_one_limb(model, settings, side, frame, shoulder, target, local)
+
+
+@helper
+def write_rig(model, local, root, rotations, pelvis):
+    """Anatomical local rotations -> the rig's local rotations (J, 4) and the pelvis' local position (3,)."""
+    for j in range(model.row.shape[0]):
+        k = model.row[j]
+        if k >= 0:
+            q = qt.mul(qt.load(model.before, j), qt.mul(qt.load(local, k), qt.load(model.after, j)))
+            qt.store(rotations, j, q)
+        else:
+            qt.store(rotations, j, qt.load(model.constant, j))
+    for i in range(3):
+        pelvis[i] = root[i] - model.pelvis_origin[i]
+
+
+@entry
+def solve_frames(model, settings, points, local, memory, rotations, pelvis, status, residual):
+    """Solve F frames in order.
+
+    Args:
+        model: The lowered figure.
+        settings: Options, with weights adapted to the frame rate.
+        points: (F, 6, 3) effector positions [m]; NaN where lost.
+        local: (rows, 4) state, updated.
+        memory: (5, 3) state, updated.
+        rotations: (F, J, 4) out, local rotations of the rig.
+        pelvis: (F, 3) out, local position of the pelvis joint [m].
+        status: (F,) out.
+        residual: (F, 6) out, distance of each effector to its target [m]; 0 where lost.
+    """
+    count = model.segments.shape[0]
+    scratch = (np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 4)), np.empty((count, 2)))
+    known, filled = np.zeros(6, np.bool_), np.zeros((6, 3))
+    for f in range(points.shape[0]):
+        status[f] = solve_frame(
+            model, settings, points[f], known, filled, local, memory, residual[f], scratch
+        )
+        write_rig(model, local, vec.load(memory, 2), rotations[f], pelvis[f])
+
+
+def weights_at_rate(weights, dt):
+    """Weights that keep, at a frame time dt, the memory they have at 120 Hz.
+
+    The share of new information per frame is b = (w1 + w2) / (w1 + w2 + w3); over equal times the same
+    forgetting needs b' = 1 - (1 - b)^(120 dt). The ratio of w1 to w2 stays.
+    """
+    w1, w2, w3 = weights
+    new = w1 + w2
+    if w3 <= 0.0 or new <= 0.0:
+        return w1, w2, w3
+    share = 1.0 - (w3 / (new + w3)) ** (120.0 * dt)
+    scaled = w3 * share / (1.0 - share) / new
+    return w1 * scaled, w2 * scaled, w3

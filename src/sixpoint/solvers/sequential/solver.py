@@ -1,0 +1,148 @@
+"""Sequential IK: six points in, a whole-body pose out, limb by limb in closed form.
+
+Reference: Unzueta, Peinado, Boulic, Suescun, "Full-body performance animation with Sequential Inverse
+Kinematics", Graphical Models 70 (2008) 87-104.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.figure import Figure
+from sixpoint.body.motion import Motion, Pose
+from sixpoint.body.targets import Targets, as_points
+from sixpoint.errors import SixpointError
+from sixpoint.kernels.jit import is_cached
+from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
+from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, solve_frames, weights_at_rate
+from sixpoint.solvers.sequential.model import build_model
+
+Array = NDArray[np.float64]
+
+CHUNK = 512  # frames between two reports of progress
+
+log = logging.getLogger("sixpoint")
+
+
+class SequentialIK:
+    """Sequential Inverse Kinematics of Unzueta et al. 2008.
+
+    Args:
+        figure: What to pose.
+        weights: Influence of the wrists' line, the ankles' line and the previous frame on the pelvis' X
+            axis (w1, w2, w3), as in the paper at 120 Hz; the memory of w3 is kept at any frame rate.
+            The paper takes (1, 1, 0) for boxing and kicks, (0.1, 0.1, 1) for walking and climbing.
+        limits: Keep every joint within the figure's limits.
+        search: "exact" meets the chord length of the bent spine by Newton's method; "literal" steps by
+            0.1 and 0.01 rad as Algorithm 3 does.
+        clavicles: "neutral" starts the clavicle from rest in every frame; "hold" from the last frame.
+        align_pelvis: Twist the trunk about the line pelvis-head after it is placed, so that the pelvis'
+            X axis is as near as possible to its estimate (not in the paper).
+
+    Raises:
+        SixpointError: An option has an impossible value.
+    """
+
+    name = "sik"
+
+    def __init__(
+        self,
+        figure: Figure,
+        *,
+        weights: tuple[float, float, float] = (1.0, 1.0, 0.0),
+        limits: bool = True,
+        search: Literal["exact", "literal"] = "exact",
+        clavicles: Literal["neutral", "hold"] = "neutral",
+        align_pelvis: bool = False,
+    ) -> None:
+        if len(weights) != 3 or not np.all(np.isfinite(weights)) or min(weights) < 0 or max(weights) <= 0:
+            raise SixpointError(f"weights are three numbers, none negative, not all zero; got {weights}")
+        if search not in ("exact", "literal"):
+            raise SixpointError(f"search is 'exact' or 'literal', got {search!r}")
+        if clavicles not in ("neutral", "hold"):
+            raise SixpointError(f"clavicles is 'neutral' or 'hold', got {clavicles!r}")
+        self.figure = figure
+        self.weights = (float(weights[0]), float(weights[1]), float(weights[2]))
+        self._options = (bool(limits), search == "literal", clavicles == "hold", bool(align_pelvis))
+        self._model = build_model(figure)
+
+    def solve(self, points: ArrayLike, previous: Solution | None = None, dt: float = 1 / 60) -> Solution:
+        """Pose the figure for one frame.
+
+        Args:
+            points: (6, 3) positions of the effectors in the order of ``EFFECTORS`` [m]; NaN where lost.
+            previous: The solution of the frame before, if any.
+            dt: Time since that frame [s].
+        """
+        frame = as_points(points)
+        local, memory = self._start() if previous is None else (s.copy() for s in previous.state)
+        joints = len(self.figure.skeleton)
+        rotations, pelvis = np.empty((1, joints, 4)), np.empty((1, 3))
+        status, residual = np.empty(1, np.int64), np.empty((1, 6))
+        solve_frames(
+            self._model, self._settings(dt), frame[None], local, memory, rotations, pelvis, status, residual
+        )
+        moving, translations = self._place(pelvis)
+        pose = Pose(self.figure.skeleton, rotations[0], translations[0], moving)
+        return Solution(pose, Status(status[0]), residual[0], 1, (local, memory))
+
+    def solve_frames(self, targets: Targets, progress: Progress | None = None) -> MotionSolution:
+        """Pose the figure for every frame.
+
+        Args:
+            targets: Where the six points are.
+            progress: Called with the number of frames done, every few hundred frames.
+        """
+        frames, joints = len(targets), len(self.figure.skeleton)
+        rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
+        status, residual = np.empty(frames, np.int64), np.empty((frames, 6))
+        local, memory = self._start()
+        settings = self._settings(1.0 / targets.rate)
+        step = CHUNK if progress else frames
+        for first in range(0, frames, step):
+            part = slice(first, min(first + step, frames))
+            solve_frames(
+                self._model, settings, targets.positions[part], local, memory,
+                rotations[part], pelvis[part], status[part], residual[part],
+            )
+            if progress:
+                progress(part.stop)
+        moving, translations = self._place(pelvis)
+        rotations.flags.writeable = False  # hand over instead of copying
+        motion = Motion(
+            self.figure.skeleton, rotations, translations, targets.rate, moving, name=targets.name
+        )
+        return MotionSolution(motion, status, residual)
+
+    def solve_motion(self, targets: Targets) -> Motion:
+        """Pose the figure for every frame."""
+        return self.solve_frames(targets).motion
+
+    def warm_up(self) -> None:
+        """Compile the kernels, or load them from disk, on the neutral pose."""
+        if not is_cached("solve_frames"):
+            log.warning("compiling kernels, once (a few seconds)")
+        rest = self.figure.rest_positions
+        r = self.figure.roles
+        points = rest[[r.pelvis, r.head, *r.wrist, *r.ankle]]
+        points[1] += self.figure.head_offset
+        self.solve(points)
+
+    def _settings(self, dt: float) -> Settings:
+        return Settings(*weights_at_rate(self.weights, dt), *self._options)
+
+    def _start(self) -> tuple[Array, Array]:
+        return np.tile(rot.IDENTITY, (self._model.rows, 1)), np.zeros((MEMORY_ROWS, 3))
+
+    def _place(self, pelvis: Array) -> tuple[tuple[int, ...], Array]:
+        """Which joints translate and where to; a root above the pelvis stands still."""
+        joint = self.figure.roles.pelvis
+        if joint == 0:
+            return (0,), pelvis[:, None]
+        root = np.broadcast_to(self.figure.skeleton.offsets[0], pelvis.shape)
+        return (0, joint), np.stack([root, pelvis], axis=1)

@@ -1,0 +1,327 @@
+"""Step 2: bend or stretch the trunk between pelvis and head (Unzueta et al. 2008, Algorithms 2 and 3).
+
+All trunk segments turn about one world axis v by shares of the pelvis' angle phi (eq. 1), so the chord
+pelvis-head is a sum of plane rotations: the search for the chord length costs a few multiplications a step.
+
+Scratch arrays: ``world`` (S, 4) are the world rotations of the trunk joints, ``segs`` (S, 3) the segment
+vectors in the world; both are updated in place. ``local`` rows 1 to S - 1 are the interior joints.
+"""
+
+from math import cos, sin, sqrt
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import helper
+from sixpoint.kernels.swing_twist import clamp
+
+COARSE, FINE = 0.1, 0.01  # rad, Algorithm 3
+COARSE_CAP, FINE_CAP = 40, 20
+STALL = 1e-5  # m, a coarse step that changes the chord by less leads nowhere
+ALIGNED = 1e-3  # sine of the angle below which two chords span no plane
+EXACT = 1e-10  # m
+
+
+@helper
+def place_trunk(model, local, world, segs):
+    """World rotations and segments of the trunk from its local rotations."""
+    q = qt.load(local, 0)
+    for k in range(model.segments.shape[0]):
+        if k > 0:
+            q = qt.mul(q, qt.load(local, k))
+        qt.store(world, k, q)
+        vec.store(segs, k, qt.mul_vec(q, vec.load(model.segments, k)))
+
+
+@helper
+def read_trunk(world, local):
+    """Local rotations of pelvis and interior joints from world rotations."""
+    before = qt.load(world, 0)
+    qt.store(local, 0, before)
+    for k in range(1, world.shape[0]):
+        q = qt.load(world, k)
+        qt.store(local, k, qt.normalised(qt.inv_mul(before, q)))
+        before = q
+
+
+@helper
+def chord_of(segs):
+    total = (0.0, 0.0, 0.0)
+    for k in range(segs.shape[0]):
+        total = vec.add(total, vec.load(segs, k))
+    return total
+
+
+@helper
+def bending_axis(chord, wanted, local, world, plane, has_plane):
+    """Unit normal of the bending plane: current chord x wanted chord, kept on the side already bent to.
+
+    METHODS of the search (see docs/methods.md): with this order and a persistent side both shortening and
+    lengthening converge; the listing's flipping sign folds the spine the wrong way on the way back.
+    """
+    v = vec.cross(vec.unit(chord), vec.unit(wanted))
+    length = vec.norm(v)
+    if length > ALIGNED:
+        v = vec.scale(1.0 / length, v)
+    elif has_plane:
+        v = plane
+    else:
+        v = qt.x_axis(qt.load(world, 0))  # forward flexion
+    bent = (0.0, 0.0, 0.0)
+    for k in range(1, world.shape[0]):
+        q = qt.load(local, k)
+        s = 2.0 if q[3] >= 0.0 else -2.0
+        bent = vec.madd(bent, s, qt.mul_vec(qt.load(world, k - 1), (q[0], q[1], q[2])))
+    if vec.dot(bent, v) < -1e-9:
+        v = vec.scale(-1.0, v)
+    return v
+
+
+@helper
+def plane_components(segs, v, flat):
+    """Write the parts of the segments across v into flat (S, 2); return the length along v."""
+    helper_axis = (1.0, 0.0, 0.0) if abs(v[0]) < 0.7 else (0.0, 1.0, 0.0)
+    e1 = vec.unit(vec.cross(v, helper_axis))
+    e2 = vec.cross(v, e1)
+    along = 0.0
+    for k in range(segs.shape[0]):
+        s = vec.load(segs, k)
+        along += vec.dot(s, v)
+        flat[k, 0] = vec.dot(s, e1)
+        flat[k, 1] = vec.dot(s, e2)
+    return along
+
+
+@helper
+def flat_chord(bend, flat, phi):
+    """Chord across v after turning by phi: length squared and half its derivative."""
+    x, y, dx, dy = 0.0, 0.0, 0.0, 0.0
+    for k in range(flat.shape[0]):
+        share = bend[k, 0]
+        c, s = cos(share * phi), sin(share * phi)
+        px = c * flat[k, 0] - s * flat[k, 1]
+        py = s * flat[k, 0] + c * flat[k, 1]
+        x += px
+        y += py
+        dx -= share * py
+        dy += share * px
+    return x * x + y * y, x * dx + y * dy
+
+
+@helper
+def search_angle(bend, flat, along, wanted, literal):
+    """Angle phi of the pelvis for which the chord has the wanted length (Algorithm 3).
+
+    Coarse steps of 0.1 rad until the length is passed, then either fine steps of 0.01 rad back
+    (``literal``) or Newton's method inside the last coarse step, which meets the length exactly.
+
+    Returns:
+        phi [rad] and whether the length was met; if not, phi is the best found.
+    """
+    squared = flat_chord(bend, flat, 0.0)[0]
+    goal = wanted * wanted - along * along
+    sign = 1.0 if squared > goal else -1.0
+    length = sqrt(squared + along * along)
+    step, phi, steps = -sign, 0.0, 0
+    flipped = False
+    best_phi, best_gap = 0.0, abs(length - wanted)
+    passed = abs(length - wanted) < EXACT
+    while not passed and steps < COARSE_CAP:
+        phi += step * COARSE
+        steps += 1
+        squared = _coarse(bend, flat, phi)
+        before, length = length, sqrt(squared + along * along)
+        passed = sign * squared <= sign * goal
+        gap = abs(length - wanted)
+        if passed:
+            break
+        if gap < best_gap:
+            best_phi, best_gap = phi, gap
+        elif steps == 1 and not flipped:
+            flipped, step, phi, steps = True, sign, 0.0, 0
+            length = before
+        else:
+            return best_phi, False
+        if abs(length - before) < STALL and steps > 0:
+            return best_phi, False
+    if not passed:
+        return best_phi, False
+    if phi == 0.0:
+        return phi, True
+    if literal:
+        for _ in range(FINE_CAP):
+            phi -= step * FINE
+            if sign * flat_chord(bend, flat, phi)[0] >= sign * goal:
+                break
+        return phi, True
+    return _refine(bend, flat, goal, phi - step * COARSE, phi, along), True
+
+
+@helper
+def _coarse(bend, flat, phi):
+    return flat_chord(bend, flat, phi)[0]
+
+
+@helper
+def _refine(bend, flat, goal, inside, outside, along):
+    """Newton's method kept inside the bracket; f = chord squared minus goal."""
+    f_inside = flat_chord(bend, flat, inside)[0] - goal
+    phi = outside
+    tolerance = 2.0 * sqrt(max(goal + along * along, 1e-12)) * EXACT
+    for _ in range(40):
+        squared, slope = flat_chord(bend, flat, phi)
+        f = squared - goal
+        if abs(f) < tolerance:
+            break
+        if (f > 0.0) == (f_inside > 0.0):
+            inside, f_inside = phi, f
+        else:
+            outside = phi
+        newton = phi - f / (2.0 * slope) if slope != 0.0 else outside
+        phi = newton if (newton - inside) * (newton - outside) < 0.0 else 0.5 * (inside + outside)
+    return phi
+
+
+@helper
+def turn_trunk(model, v, phi, world, segs):
+    """Turn every segment by its share of phi about v."""
+    for k in range(world.shape[0]):
+        q = qt.from_axis_angle(v, model.bend[k, 0] * phi)
+        qt.store(world, k, qt.mul(q, qt.load(world, k)))
+        vec.store(segs, k, qt.mul_vec(q, vec.load(segs, k)))
+
+
+@helper
+def clamp_interior(model, local):
+    """Set the interior joints within their limits; whether any was outside."""
+    any_changed = False
+    for k in range(1, model.segments.shape[0]):
+        q, changed = clamp(model.balls, k, qt.load(local, k))
+        if changed:
+            qt.store(local, k, q)
+            any_changed = True
+    return any_changed
+
+
+@helper
+def _clamped_chord(model, v, phi, start, world, segs, local):
+    """Chord length after turning the trunk from ``start`` (local rotations) by phi within the limits."""
+    for k in range(world.shape[0]):
+        qt.store(local, k, qt.load(start, k))
+    place_trunk(model, local, world, segs)
+    turn_trunk(model, v, phi, world, segs)
+    read_trunk(world, local)
+    clamp_interior(model, local)
+    place_trunk(model, local, world, segs)
+    return vec.norm(chord_of(segs))
+
+
+@helper
+def search_within_limits(model, v, wanted, start, world, segs, local):
+    """Algorithm 3 with the limits inside the loop: coarse steps, then bisection of the last one.
+
+    ``start`` holds the local rotations to bend from. Leaves the trunk at the best angle found.
+    """
+    length = _clamped_chord(model, v, 0.0, start, world, segs, local)
+    sign = 1.0 if length > wanted else -1.0
+    step, phi, best_phi, best_gap = -sign * COARSE, 0.0, 0.0, abs(length - wanted)
+    passed, flipped = False, False
+    steps = 0
+    while steps < COARSE_CAP:
+        before = length
+        length = _clamped_chord(model, v, phi + step, start, world, segs, local)
+        steps += 1
+        if sign * length <= sign * wanted:
+            passed = True
+            break
+        gap = abs(length - wanted)
+        if gap < best_gap:
+            best_phi, best_gap = phi + step, gap
+        elif phi == 0.0 and not flipped:
+            flipped, step, length = True, -step, before
+            continue
+        if abs(length - before) < STALL or gap > best_gap:
+            break
+        phi += step
+    if passed:
+        low, high = phi, phi + step
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            length = _clamped_chord(model, v, middle, start, world, segs, local)
+            if sign * length > sign * wanted:
+                low = middle
+            else:
+                high = middle
+        best_phi = high
+    return abs(_clamped_chord(model, v, best_phi, start, world, segs, local) - wanted) < 1e-4
+
+
+@helper
+def unbend(model, wanted, start, world, segs, local):
+    """Lengthen a trunk bent in another plane: shrink all interior rotations by one factor, by bisection."""
+    low, high = 0.0, 1.0  # fraction of the bend that is kept
+    for _ in range(30):
+        kept = 0.5 * (low + high)
+        qt.store(local, 0, qt.load(start, 0))
+        for k in range(1, world.shape[0]):
+            qt.store(local, k, qt.scaled(qt.load(start, k), kept))
+        place_trunk(model, local, world, segs)
+        if vec.norm(chord_of(segs)) > wanted:
+            low = kept
+        else:
+            high = kept
+
+
+@helper
+def stretch(model, wanted, local):
+    """Interior rotations, and the pelvis' own turn, of the precomputed stretch pose of a chord length."""
+    chords = model.stretch_chords
+    last = chords.shape[0] - 1
+    k = 0
+    while k < last - 1 and chords[k + 1] < wanted:
+        k += 1
+    width = chords[k + 1] - chords[k]
+    fraction = 0.0 if width < 1e-12 else (wanted - chords[k]) / width
+    if width < 1e-12 and wanted > chords[k]:
+        fraction = 1.0
+    t = min(max((k + min(max(fraction, 0.0), 1.0)) / last, 0.0), 1.0)
+    before = qt.IDENTITY
+    for k in range(model.segments.shape[0]):
+        q = qt.from_axis_angle(vec.load(model.stretch_axes, k), t * model.stretch_angles[k])
+        if k == 0:
+            qt.store(local, 0, qt.mul(qt.load(local, 0), q))
+        else:
+            qt.store(local, k, qt.inv_mul(before, q))
+        before = q
+
+
+@helper
+def set_chord(model, wanted, chord_goal, settings, local, start, world, segs, flat, plane, has_plane):
+    """Give the trunk the wanted chord length (Algorithm 2, lines 4 to 13).
+
+    Returns:
+        The bending plane's normal used, and whether there is one to remember.
+    """
+    count = model.segments.shape[0]
+    if wanted >= model.neutral_chord or count < 2:
+        if count > 1:
+            # A precomputed pose replaces the trunk's shape; the pelvis starts from its neutral relation.
+            stretch(model, wanted, local)
+        place_trunk(model, local, world, segs)
+        return plane, has_plane
+    if vec.norm(chord_of(segs)) > model.neutral_chord:
+        for k in range(1, count):
+            qt.store(local, k, qt.IDENTITY)
+        place_trunk(model, local, world, segs)
+    for k in range(count):
+        qt.store(start, k, qt.load(local, k))
+    v = bending_axis(chord_of(segs), chord_goal, local, world, plane, has_plane)
+    along = plane_components(segs, v, flat)
+    lengthening = vec.norm(chord_of(segs)) < wanted
+    phi, met = search_angle(model.bend, flat, along, wanted, settings.literal)
+    turn_trunk(model, v, phi, world, segs)
+    read_trunk(world, local)
+    if settings.limits and clamp_interior(model, local):
+        met = search_within_limits(model, v, wanted, start, world, segs, local)
+    if not met and lengthening:
+        unbend(model, wanted, start, world, segs, local)
+    return v, True
