@@ -1,0 +1,35 @@
+"""Where the real recordings are. Tests that need them skip with a reason where they are absent."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def data_folder() -> Path | None:
+    """The folder of real recordings: ``$SIXPOINT_DATA`` or ``../shared/data`` beside the repository."""
+    given = os.environ.get("SIXPOINT_DATA")
+    folder = Path(given) if given else Path(__file__).resolve().parents[2] / "shared" / "data"
+    return folder if folder.is_dir() else None
+
+
+def recordings(pattern: str) -> list[Any]:
+    """Test parameters: paths below the data folder that match; one skipped parameter without it."""
+    folder = data_folder()
+    found = sorted(folder.glob(pattern)) if folder else []
+    if not found:
+        reason = f"no recordings {pattern} in $SIXPOINT_DATA or ../shared/data"
+        return [pytest.param(None, marks=pytest.mark.skip(reason=reason), id="no-data")]
+    return [pytest.param(path, id=str(path.relative_to(folder))) for path in found if folder]
+
+
+@pytest.fixture
+def data() -> Path:
+    """The folder of real recordings."""
+    folder = data_folder()
+    if folder is None:
+        pytest.skip("no recordings: set SIXPOINT_DATA or put them into ../shared/data")
+    return folder
