@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
-from sixpoint.samples.keyframes import Keys, curve, degrees, frame_times, mix, sway
+from sixpoint.samples.keyframes import Keys, curve, frame_times, mix, sway
 from sixpoint.samples.pose import hold_hand, step_foot
-from sixpoint.samples.puppet import Foot, Hand, Puppet, Trunk
+from sixpoint.samples.puppet import Puppet
+from sixpoint.samples.tracks import Foot, Hand, Trunk
 
 Array = NDArray[np.float64]
 
@@ -81,31 +82,29 @@ def _pivot_on_ball(foot: Foot, turned: Array) -> Foot:
     """Move the place of a foot so that its ball stays while it yaws by ``turned`` (F,) [deg]."""
     before = foot.turn[:, 0] - np.radians(turned)
     ball = 0.12
-    shift = np.stack(
-        [np.sin(before) - np.sin(foot.turn[:, 0]), np.zeros_like(turned), np.cos(before) - np.cos(foot.turn[:, 0])],
-        axis=-1,
-    )
-    return replace(foot, place=foot.place + ball * shift)
+    after = foot.turn[:, 0]
+    shift = [np.sin(before) - np.sin(after), 0 * after, np.cos(before) - np.cos(after)]
+    return replace(foot, place=foot.place + ball * np.stack(shift, axis=-1))
 
 
 def _left(puppet: Puppet, t: Array, jab: Array, hook: Array, wind: Array) -> Hand:
-    guard: Keys = {0: (-0.16, 0.12, 0.52), 3.4: (-0.16, 0.12, 0.52), 3.9: (-0.2, 0.14, 0.46), 4.5: (-0.16, 0.12, 0.52)}
+    guard: Keys = {3.4: (-0.16, 0.12, 0.52), 3.9: (-0.2, 0.14, 0.46), 4.5: (-0.16, 0.12, 0.52)}
     hand = hold_hand(puppet, 0, t, guard, swivel={0: -8})
     wrist = hand.wrist + 0.012 * np.stack([sway(t, 0.7), sway(t, 1.1, 0.4), sway(t, 0.8, 0.2)], axis=-1)
     wrist = mix(wrist, puppet.in_chest(0, np.array([0.35, -0.12, 0.52])), wind)
     wrist = mix(wrist, [0.0, 1.47, 0.86], jab)
     # The fist of a hook flies on an arc around the shoulder, not through it.
     wrist = mix(wrist, puppet.in_chest(0, np.array([-0.06, 0.08, 0.58])), hook)
-    turn = np.radians([10.0, 5.0, 8.0]) + np.radians(70) * np.stack([jab + 0.6 * hook, 0 * jab, 0 * jab], axis=-1)
+    turn = np.radians([10.0, 5.0, 8.0]) + np.radians(70) * np.outer(jab + 0.6 * hook, [1, 0, 0])
     shrug = np.radians(np.stack([6 * jab + 4 * hook, 14 * jab + 6 * hook], axis=-1))
     return Hand(wrist, np.radians(-8 + 22 * jab + 72 * hook + 10 * wind), turn, shrug)
 
 
 def _right(puppet: Puppet, t: Array, cross: Array) -> Hand:
-    guard: Keys = {0: (-0.22, 0.14, 0.42), 3.4: (-0.22, 0.14, 0.42), 3.9: (-0.24, 0.16, 0.42), 4.5: (-0.22, 0.14, 0.42)}
+    guard: Keys = {3.4: (-0.22, 0.14, 0.42), 3.9: (-0.24, 0.16, 0.42), 4.5: (-0.22, 0.14, 0.42)}
     hand = hold_hand(puppet, 1, t, guard)
     wrist = hand.wrist + 0.010 * np.stack([sway(t, 0.8, 0.5), sway(t, 1.0, 0.1), sway(t, 0.6)], axis=-1)
     wrist = mix(wrist, [0.02, 1.49, 0.86], cross)
-    turn = np.radians([10.0, 5.0, 8.0]) + np.radians(70) * np.stack([cross, 0 * cross, 0 * cross], axis=-1)
+    turn = np.radians([10.0, 5.0, 8.0]) + np.radians(70) * np.outer(cross, [1, 0, 0])
     shrug = np.radians(np.stack([6 * cross, 14 * cross], axis=-1))
     return Hand(wrist, np.radians(-10 + 24 * cross), turn, shrug)

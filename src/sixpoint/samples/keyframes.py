@@ -50,7 +50,7 @@ def curve(keys: Keys, at: Array, period: float | None = None) -> Array:
 
 
 def ballistic(keys: Mapping[float, tuple[float, float]], at: Array) -> Array:
-    """A curve (F,) through values with given slopes, {time: (value, slope)}; free fall is such a curve, exactly."""
+    """A curve (F,) through {time: (value, slope)}; free fall is such a curve, exactly."""
     times = np.array(list(keys), float)
     values, slopes = np.array(list(keys.values()), float).T
     return np.asarray(CubicHermiteSpline(times, values, slopes)(np.clip(at, times[0], times[-1])), float)

@@ -43,7 +43,9 @@ def limit_reach(vector: Array, length: float) -> Array:
     return np.asarray(vector * limited / np.maximum(distance, 1e-9), float)
 
 
-def solve_two_bones(vector: Array, pole: Array, upper: float, lower: float, bend: float) -> tuple[Array, Array]:
+def solve_two_bones(
+    vector: Array, pole: Array, upper: float, lower: float, bend: float
+) -> tuple[Array, Array]:
     """Rotation of the upper bone and flexion of the middle joint.
 
     Args:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.samples.keyframes import Keys, curve, degrees, mix
-from sixpoint.samples.puppet import Foot, Hand, Puppet, compute_ankle
+from sixpoint.samples.puppet import Puppet
+from sixpoint.samples.tracks import Foot, Hand, compute_ankle
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def step_foot(t: Array, place: Keys, turn: Keys, swivel: Keys | None = None) -> 
 
 
 def lift_foot(puppet: Puppet, side: int, t: Array, foot: Foot, air: Keys, ankle: Keys, point: Keys) -> Foot:
-    """Let a foot leave the ground: its ankle then goes through points given from the hip, in the pelvis' frame.
+    """Let a foot leave the ground; its ankle then goes through points given from the hip.
 
     Args:
         puppet: Whose foot.
@@ -60,7 +61,7 @@ def lift_foot(puppet: Puppet, side: int, t: Array, foot: Foot, air: Keys, ankle:
         t: (F,) times [s].
         foot: What the foot does on the ground.
         air: 0 on the ground, 1 in the air.
-        ankle: Ankle from the hip [m], x away from the body.
+        ankle: Ankle from the hip in the pelvis' frame [m], x away from the body.
         point: How far the toes are pointed [deg].
     """
     weight = curve(air, t)

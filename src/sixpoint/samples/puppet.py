@@ -19,68 +19,12 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.samples.keyframes import RATE, smooth_step
 from sixpoint.samples.limb import X, Y, Z, compute_pole, limit_reach, solve_two_bones
+from sixpoint.samples.tracks import Foot, Hand, Trunk, compute_ankle
 
 Array = NDArray[np.float64]
 
 LEG = 0.861  # thigh and calf of the figure the samples are authored for [m]
-BALL = np.array([0.0, -0.0580, 0.1197])  # ball of the foot from the ankle, foot flat [m]
-HEEL = np.array([0.0, -0.0683, -0.0745])  # heel from the ankle [m]
 SIDES = (1.0, -1.0)
-
-
-@dataclass(frozen=True)
-class Trunk:
-    """Curves of pelvis, spine and head.
-
-    Attributes:
-        pelvis: (F, 3) position of the pelvis in the world [m].
-        turn: (F, 3) yaw (left +), forward tilt, list (left side up +) of the pelvis in the world [rad].
-        spine: (F, 3) flexion (forward +), side bend (left +), twist (left +) of pelvis to chest [rad].
-        gaze: (F, 3) yaw, downward pitch, roll of the head in the world [rad]; the neck follows as far
-            as it can.
-    """
-
-    pelvis: Array
-    turn: Array
-    spine: Array
-    gaze: Array
-
-
-@dataclass(frozen=True)
-class Foot:
-    """Curves of one foot.
-
-    Attributes:
-        place: (F, 3) point of the sole below the ankle, if the foot were flat [m]; y = 0 is the floor.
-        turn: (F, 3) yaw in the world (left +), pitch (heel up +, about the ball; toes up -, about the
-            heel), roll [rad].
-        swivel: (F,) knee outwards [rad], beyond following the toes.
-        air: (F,) 1 where the foot hangs from its shank instead of keeping its turn in the world.
-        point: (F,) how far the hanging foot points its toes [rad].
-    """
-
-    place: Array
-    turn: Array
-    swivel: Array
-    air: Array
-    point: Array
-
-
-@dataclass(frozen=True)
-class Hand:
-    """Curves of one hand.
-
-    Attributes:
-        wrist: (F, 3) position in the world [m].
-        swivel: (F,) elbow raised outwards [rad].
-        turn: (F, 3) pronation, flexion (towards the palm), deviation (towards the thumb) [rad].
-        shrug: (F, 2) elevation and protraction of the shoulder [rad], beyond what the arm asks for.
-    """
-
-    wrist: Array
-    swivel: Array
-    turn: Array
-    shrug: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +104,7 @@ class Puppet:
         return (chest + rot.mul_vec(turned, local)) / self.scale
 
     def in_pelvis(self, side: int, points: ArrayLike) -> Array:
-        """Points (F, 3) given from the hip in the pelvis' frame [m], x away from the body, as world points."""
+        """Points (F, 3) given from the hip in the pelvis' frame [m], x outwards, as world points."""
         pelvis, turned = self._world(self.figure.roles.pelvis)
         hip = self.figure.offset_between(self.figure.roles.pelvis, self.figure.roles.hip[side])
         local = np.asarray(points, float) * [SIDES[side], 1.0, 1.0] + hip / self.scale
@@ -193,7 +137,7 @@ class Puppet:
         self.rotations[:, ankle] = _blend(planted, hanging, foot.air)
         toe = f"{'lr'[side]}_metatarsal"
         if toe in self.figure.skeleton.names:  # toes stay flat while the heel is up, and relax in the air
-            height = np.maximum(foot.place[:, 1] , 0.0)
+            height = np.maximum(foot.place[:, 1], 0.0)
             bend = np.maximum(foot.turn[:, 1], 0.0) * np.exp(-((height / 0.06) ** 2)) * (1.0 - foot.air)
             self.rotations[:, self.figure.skeleton.index(toe)] = rot.from_axis_angle(X, -bend)
 
@@ -229,15 +173,6 @@ class Puppet:
         self.rotations[:, self.figure.roles.clavicle[side]] = rot.from_euler("YZ", angles)
 
 
-def compute_ankle(foot: Foot) -> Array:
-    """Where a foot's ankle is (F, 3) [m]: the foot rolls over heel and ball, which stay where they are."""
-    over_ball = smooth_step(foot.turn[:, 1] / 0.2 + 0.5)[:, None]
-    pivot = over_ball * BALL + (1.0 - over_ball) * HEEL
-    level = rot.from_axis_angle(Y, foot.turn[:, 0])
-    ground = foot.place - [0.0, HEEL[1], 0.0] + rot.mul_vec(level, pivot)
-    return np.asarray(ground - rot.mul_vec(rot.from_euler("YXZ", foot.turn), pivot), float)
-
-
 def _blend(a: Array, b: Array, weight: Array) -> Array:
     """From rotations ``a`` (weight 0) to ``b`` (weight 1), all (F, ...)."""
     between = rot.mul(rot.inv(a), b)
@@ -256,9 +191,10 @@ def _range(figure: Figure, joint: int) -> Array:
 
 
 def _flexion_bend_twist(q: Array) -> Array:
-    """Rotations (F, 4) as flexion, side bend and twist (F, 3) [rad]: swing about X and Z after twist about Y."""
+    """Rotations (F, 4) as flexion, side bend and twist (F, 3) [rad]: a twist about Y, then a swing."""
     twist = 2.0 * np.arctan2(q[:, 1], q[:, 3])
     twist = (twist + np.pi) % (2 * np.pi) - np.pi
     swing = rot.mul(q, rot.inv(rot.from_axis_angle(Y, twist)))
-    vector = rot.unit(swing[:, :3]) * (2.0 * np.arctan2(np.linalg.norm(swing[:, :3], axis=1), swing[:, 3]))[:, None]
+    size = 2.0 * np.arctan2(np.linalg.norm(swing[:, :3], axis=1), swing[:, 3])
+    vector = rot.unit(swing[:, :3]) * size[:, None]
     return np.stack([vector[:, 0], -vector[:, 2], twist], axis=-1)

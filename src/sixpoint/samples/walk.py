@@ -13,7 +13,8 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.samples.keyframes import curve, degrees, frame_times, smooth_step, sway
 from sixpoint.samples.pose import swing_arm
-from sixpoint.samples.puppet import Foot, Hand, Puppet, Trunk
+from sixpoint.samples.puppet import Puppet
+from sixpoint.samples.tracks import Foot, Hand, Trunk
 
 Array = NDArray[np.float64]
 

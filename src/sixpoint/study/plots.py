@@ -1,8 +1,8 @@
 """Pictures of poses and errors: a film strip of mannequins, and curves under it.
 
-Bodies are drawn as tapered capsules in an orthographic view, far parts first. The truth is a soft grey body,
-the result a coloured skeleton on top of it, so that what differs sticks out. Works for any figure: only joints
-with roles are drawn. Uses Matplotlib's objects, never pyplot; files are written whole or not at all.
+Bodies are drawn as tapered capsules in an orthographic view, far parts first. The truth is a soft grey
+body, the result a coloured skeleton on top of it: what differs sticks out. Works for any figure; joints
+without a role are left out. Uses Matplotlib's objects, never pyplot; files are written whole or not at all.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,12 @@ def draw_comparison(
 
 
 def draw_poses(
-    figure: Figure, motion: Motion, path: str | Path, frames: Sequence[int] | None = None, *, title: str | None = None
+    figure: Figure,
+    motion: Motion,
+    path: str | Path,
+    frames: Sequence[int] | None = None,
+    *,
+    title: str | None = None,
 ) -> Path:
     """Draw a film strip of one motion.
 
@@ -126,12 +132,13 @@ def draw_error_curves(
     canvas = Canvas(figsize=(WIDTH, 4.0), dpi=DPI)
     axes = canvas.add_axes((0.065, 0.14, 0.77, 0.74))
     for k, (name, (times, values)) in enumerate(curves.items()):
-        axes.plot(times, values, color=SERIES[k % len(SERIES)], lw=1.8, ls=("-", "--")[k // len(SERIES) % 2], label=name)
-    ends = np.concatenate([np.asarray(times, float) for times, _ in curves.values()] or [np.array([0.0, 1.0])])
+        dashes = ("-", "--")[k // len(SERIES) % 2]
+        axes.plot(times, values, color=SERIES[k % len(SERIES)], lw=1.8, ls=dashes, label=name)
+    ends = np.concatenate([np.asarray(times, float) for times, _ in curves.values()] or [np.zeros(1)])
     axes.set_ylim(bottom=0)
     _style(axes, ends, ylabel)
     if curves:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), frameon=False, labelcolor=INK, fontsize=9.5)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, labelcolor=INK, fontsize=9.5)
     if title:
         _heading(canvas, title, "")
     return _save(canvas, path)
@@ -183,12 +190,13 @@ def _parts(figure: Figure, positions: Array, world: Array, slim: bool) -> list[_
     waist, chest = trunk[len(trunk) // 3], trunk[-3 if len(trunk) > 4 else -2]
     parts = [part(TRUNK, [trunk[-1], chest], 0.048, 0.055)]
     if slim:
-        parts += [part(TRUNK, pair, 0.05, 0.05) for pair in zip(trunk[:-1], trunk[1:], strict=True)]
-        parts += [part(TRUNK, [p[k], p[pair[1]]], 0.045, 0.045) for pair in (r.hip,) for k in pair[:1]]
+        parts += [part(TRUNK, pair, 0.05, 0.05) for pair in pairwise(trunk)]
+        parts += [part(TRUNK, [p[r.pelvis], p[k]], 0.045, 0.045) for k in r.hip]
         parts += [part(TRUNK, [chest, p[k]], 0.045, 0.045) for k in r.shoulder]
     else:
         parts.append(part(TRUNK, [p[r.hip[0]], p[r.hip[1]], waist], 0.088, 0.088, 0.105))
-        parts.append(part(TRUNK, [p[r.shoulder[0]], p[r.shoulder[1]], waist, chest], 0.058, 0.058, 0.105, 0.09))
+        ribs = [p[r.shoulder[0]], p[r.shoulder[1]], waist, chest]
+        parts.append(part(TRUNK, ribs, 0.058, 0.058, 0.105, 0.09))
     for k, colour in enumerate((LEFT, RIGHT)):
         parts.append(part(colour, [p[r.hip[k]], p[r.knee[k]]], 0.08, 0.056))
         parts.append(part(colour, [p[r.knee[k]], p[r.ankle[k]]], 0.054, 0.037))
@@ -206,7 +214,8 @@ def _camera(figure: Figure, motion: Motion, shown: Sequence[int]) -> Array:
     across = motion.positions[shown][:, figure.roles.hip[0]] - motion.positions[shown][:, figure.roles.hip[1]]
     front = np.cross(across.mean(axis=0), [0, 1, 0])
     yaw = np.arctan2(front[0], front[2]) + VIEW_YAW
-    toward = np.array([np.sin(yaw) * np.cos(VIEW_PITCH), np.sin(VIEW_PITCH), np.cos(yaw) * np.cos(VIEW_PITCH)])
+    level = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
+    toward = np.cos(VIEW_PITCH) * level + np.array([0.0, np.sin(VIEW_PITCH), 0.0])
     right = rot.unit(np.cross([0, 1, 0], toward))
     return np.stack([right, np.cross(toward, right), toward])
 
@@ -217,6 +226,7 @@ def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below
     camera = _camera(figure, first, shown)
     places = _places(figure, *first.transforms)
     floor = float(places[..., 1].min())
+    targets = figure.targets(first).positions
     views = []
     for frame in shown:
         origin = np.array([*first.positions[frame, figure.roles.pelvis]]) * [1, 0, 1] + [0, floor, 0]
@@ -226,14 +236,15 @@ def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below
             parts = _parts(figure, positions[frame] - origin, world[frame], slim=motion is not first)
             parts.sort(key=lambda part: float((part.centres @ camera[2]).mean()))
             layers.append([(part.colour, _outline(part, camera)) for part in parts])
-        views.append((layers, (figure.targets(first.sliced(slice(frame, frame + 1))).positions[0] - origin) @ camera.T))
+        views.append((layers, (targets[frame] - origin) @ camera.T))
     edges = [np.concatenate([o for layer in layers for _, o in layer]) for layers, _ in views]
     widths = [max(float(np.ptp(e[:, 0])), 0.55 * unit) + GAP * unit for e in edges]
     wide = max(sum(widths), 5.0 * unit)
     low = min(-0.13 * unit, *(float(e[:, 1].min()) for e in edges)) - 0.14 * unit
     high = max(float(e[:, 1].max()) for e in edges) + 0.06 * unit
     tall = (high - low) / wide * WIDTH
-    canvas = Canvas(figsize=(WIDTH, round((tall + below + 0.62) * DPI) / DPI), dpi=DPI)
+    above = 0.62 if len(motions) == 1 else 0.84
+    canvas = Canvas(figsize=(WIDTH, round((tall + below + above) * DPI) / DPI), dpi=DPI)
     total = canvas.get_figheight()
     axes = canvas.add_axes((0, below / total, 1, tall / total), xlim=(0, wide), ylim=(low, high))
     axes.axis("off")
@@ -241,13 +252,19 @@ def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below
     for frame, (layers, points), edge, width in zip(shown, views, edges, widths, strict=True):
         shift = np.array([left + (width - edge[:, 0].max() - edge[:, 0].min()) / 2, 0.0])
         _draw_body(axes, layers, points[:, :2] + shift if len(motions) > 1 else None, shift, camera, unit)
-        axes.text(left + width / 2, low + 0.02 * unit, f"{frame / first.rate:.2f} s", ha="center", color=SOFT, size=9.5)
+        time = f"{frame / first.rate:.2f} s"
+        axes.text(left + width / 2, low + 0.02 * unit, time, ha="center", color=SOFT, size=9.5)
         left += width
     return canvas
 
 
 def _draw_body(
-    axes: Axes, layers: list[list[tuple[str, Array]]], points: Array | None, shift: Array, camera: Array, unit: float
+    axes: Axes,
+    layers: list[list[tuple[str, Array]]],
+    points: Array | None,
+    shift: Array,
+    camera: Array,
+    unit: float,
 ) -> None:
     around = np.linspace(0, 2 * np.pi, 60)
     disc = 0.36 * unit * np.stack([np.cos(around), np.zeros(60), np.sin(around)], axis=-1) @ camera.T
@@ -255,8 +272,9 @@ def _draw_body(
     for k, layer in enumerate(layers):
         ghost = k < len(layers) - 1
         for colour, outline in layer:
-            style = {"fc": GHOST, "ec": GHOST, "lw": 0.4} if ghost else {"fc": colour, "ec": "white", "lw": 0.9}
-            axes.add_patch(Polygon(outline + shift, joinstyle="round", zorder=1 + k, **style))
+            fill, edge = (GHOST, GHOST) if ghost else (colour, "white")
+            body = Polygon(outline + shift, fc=fill, ec=edge, lw=0.9, joinstyle="round", zorder=1 + k)
+            axes.add_patch(body)
     if points is not None:
         axes.plot(*points.T, "o", ms=5.2, color=INK, mec="white", mew=1.1, zorder=9)
 
@@ -284,10 +302,11 @@ def _heading(canvas: Canvas, title: str, note: str) -> None:
 def _legend(canvas: Canvas) -> None:
     y = 1 - 0.66 / canvas.get_figheight()
     x = 0.02
-    for colour, text in ((GHOST, "truth"), (LEFT, "result, left"), (RIGHT, "result, right"), (INK, "targets")):
+    items = ((GHOST, "truth"), (LEFT, "left side"), (RIGHT, "right side"), (INK, "six points"))
+    for colour, text in items:
         canvas.text(x, y, "\u25cf", color=colour, size=11, va="center")
         canvas.text(x + 0.014, y, text, color=SOFT, size=9.5, va="center")
-        x += 0.03 + 0.0082 * len(text)
+        x += 0.03 + 0.0062 * len(text)
 
 
 def _style(axes: Axes, times: Array, ylabel: str) -> None:
@@ -307,7 +326,8 @@ def _save(canvas: Canvas, path: str | Path) -> Path:
     handle, temporary = tempfile.mkstemp(suffix=".png", prefix=f".{path.stem}-", dir=path.parent)
     os.close(handle)
     try:
-        FigureCanvasAgg(canvas).print_png(temporary)
+        FigureCanvasAgg(canvas)
+        canvas.savefig(temporary, format="png")
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
