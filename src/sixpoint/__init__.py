@@ -1,3 +1,62 @@
-"""Natural full-body poses from six tracked points."""
+"""Natural full-body poses from six tracked points.
+
+    import sixpoint as sp
+
+    motion = sp.load("17_10.amc")
+    figure = sp.Figure.from_motion(motion)
+    result = sp.SequentialIK(figure).solve_motion(figure.targets(motion))
+    sp.save(result, "boxing.bvh")
+
+Metres, radians, seconds; Y up, Z forward, X to the figure's left; quaternions are xyzw.
+"""
+
+from sixpoint.body.dofs import Ball, Dofs, Fixed, Hinges, SwingTwist
+from sixpoint.body.figure import Figure
+from sixpoint.body.limits import Limits
+from sixpoint.body.motion import Motion, Pose
+from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.errors import FigureError, FormatError, SixpointError, SkeletonError, TargetError
+from sixpoint.formats import load, load_targets, save, save_targets
+from sixpoint.samples import SAMPLES, make_sample
+from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
+from sixpoint.solvers.registry import SOLVERS, make_solver
+from sixpoint.solvers.sequential.solver import SequentialIK
+from sixpoint.study.metrics import Errors, compute_errors
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "EFFECTORS",
+    "SAMPLES",
+    "SOLVERS",
+    "Ball",
+    "Dofs",
+    "Errors",
+    "Figure",
+    "FigureError",
+    "Fixed",
+    "FormatError",
+    "Hinges",
+    "Limits",
+    "Motion",
+    "MotionSolution",
+    "Pose",
+    "SequentialIK",
+    "SixpointError",
+    "Skeleton",
+    "SkeletonError",
+    "Solution",
+    "Solver",
+    "Status",
+    "SwingTwist",
+    "TargetError",
+    "Targets",
+    "compute_errors",
+    "load",
+    "load_targets",
+    "make_sample",
+    "make_solver",
+    "save",
+    "save_targets",
+]

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 BLOCK = 0.36  # height of the block [m]
 BAR = np.array([0.0, 2.40, 0.74])  # middle of the bar, where the wrists go [m]
 HANG, RELEASE, LAND = 4.0, 7.00, 7.33  # feet leave the block, hands leave the bar, feet land [s]
-DROP, FLOOR = 1.335, 0.92  # height of the pelvis at release and landing [m]
+DROP, FLOOR = 1.352, 0.92  # height of the pelvis at release and landing [m]
 FALL = (FLOOR - DROP) / (LAND - RELEASE)  # mean speed of the drop [m/s]
 
 
@@ -111,7 +111,9 @@ def _foot(puppet: Puppet, side: int, t: Array, late: Array) -> Foot:
         0.98 + wait: (x, BLOCK + 0.10, 0.32),
         1.18 + wait: (x, BLOCK, 0.50 - 0.02 * side),
         4.2: (x, BLOCK, 0.50 - 0.02 * side),
-        6.9: (1.3 * x, 0, 1.14 - 0.05 * side),
+        6.9: (1.3 * x, 0.01, 1.14 - 0.05 * side),
+        LAND - 0.05: (1.3 * x, 0.01, 1.14 - 0.05 * side),
+        LAND + 0.05: (1.3 * x, 0, 1.14 - 0.05 * side),
     }
     turn = {
         0.35 + wait: (6 * sign, 0, 0),
@@ -180,5 +182,5 @@ def _hand(puppet: Puppet, side: int, t: Array) -> Hand:
         8.5: (15, 8, 0),
     }
     shrug = {2.2 + wait: (0, 0), 2.7 + wait: (4, 2), 4.0: (6, 0), RELEASE: (6, 0), LAND: (0, 0)}
-    swivel = {2.2 + wait: 0, 2.7 + wait: 36, 4.2: 50, 6.8: 54, RELEASE + 0.1: 54, LAND + 0.15: 10, 8.4: 0}
+    swivel = {2.2 + wait: 0, 2.7 + wait: 36, 4.2: 50, 6.8: 54, RELEASE + 0.1: 66, LAND + 0.15: 10, 8.4: 0}
     return world_hand(t, wrist, swivel=swivel, turn=turn, shrug=shrug)

@@ -1,0 +1,1 @@
+"""How a figure is posed: one folder or file per method, one protocol for all."""

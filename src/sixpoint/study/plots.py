@@ -267,7 +267,7 @@ def _draw_body(
     unit: float,
 ) -> None:
     around = np.linspace(0, 2 * np.pi, 60)
-    disc = 0.36 * unit * np.stack([np.cos(around), np.zeros(60), np.sin(around)], axis=-1) @ camera.T
+    disc = 0.29 * unit * np.stack([np.cos(around), np.zeros(60), np.sin(around)], axis=-1) @ camera.T
     axes.add_patch(Polygon(disc[:, :2] + shift, fc="#f1f3f5", ec="none", zorder=0))
     for k, layer in enumerate(layers):
         ghost = k < len(layers) - 1

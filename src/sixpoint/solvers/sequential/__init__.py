@@ -1,0 +1,1 @@
+"""Sequential IK (Unzueta et al. 2008): one file per step of the paper."""

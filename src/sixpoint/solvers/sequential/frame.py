@@ -67,17 +67,13 @@ def fill_lost(points, known, filled, local, memory, world, segs, model):
 
 
 @helper
-def solve_trunk(model, settings, pelvis, head, x_estimated, local, memory, scratch):
-    """Pelvis and spine (Algorithm 2); returns the pelvis joint's position."""
+def solve_trunk(model, settings, pelvis, head, x_estimated, y, local, memory, scratch):
+    """Pelvis and spine (Algorithm 2); returns the pelvis joint's position. ``y`` is the chord's direction."""
     world, segs, start, flat = scratch
     goal = vec.sub(head, pelvis)
     wanted = vec.norm(goal)
-    y = vec.unit(goal)
-    if memory[4, 0] == 0.0 or wanted >= model.neutral_chord:
-        # Nothing bent yet, or a stretch pose: the pelvis starts from its estimate.
-        z = vec.cross(x_estimated, y)
-        if vec.norm(z) > 0.5:
-            qt.store(local, 0, qt.from_axes(x_estimated, y, z))
+    # The trunk starts with the spine of the frame before and the pelvis as just estimated (Algorithm 1).
+    qt.store(local, 0, qt.from_axes(x_estimated, y, vec.cross(x_estimated, y)))
     spine.place_trunk(model, local, world, segs)
     v, has_plane = spine.set_chord(
         model, wanted, goal, settings, local, start, world, segs, flat,
@@ -93,7 +89,7 @@ def solve_trunk(model, settings, pelvis, head, x_estimated, local, memory, scrat
         spine.place_trunk(model, local, world, segs)
     chord = spine.chord_of(segs)
     length = vec.norm(chord)
-    if wanted > 1e-9 and length > 1e-9:  # line 16
+    if length > 1e-9:  # line 16
         turned = vec.unit(qt.mul_vec(turn, chord))
         turn = qt.mul(qt.arc(turned, y, x_estimated), turn)
         if settings.align_pelvis:  # optional: twist about the chord, X as near to the estimate as it gets
@@ -137,7 +133,7 @@ def solve_frame(model, settings, points, known, filled, local, memory, residual,
     x = estimate_x(
         filled, known, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3
     )
-    root = solve_trunk(model, settings, pelvis, head, x, local, memory, scratch)
+    root = solve_trunk(model, settings, pelvis, head, x, y, local, memory, scratch)
     chord_end = vec.add(root, spine.chord_of(segs))
     vec.store(memory, 0, x)
     vec.store(memory, 2, root)

@@ -17,6 +17,7 @@ from sixpoint.kernels.swing_twist import clamp
 COARSE, FINE = 0.1, 0.01  # rad, Algorithm 3
 COARSE_CAP, FINE_CAP = 40, 20
 STALL = 1e-5  # m, a coarse step that changes the chord by less leads nowhere
+STRAIGHT = 1e-3  # rad, a trunk bent by less has no plane
 ALIGNED = 1e-3  # sine of the angle below which two chords span no plane
 EXACT = 1e-10  # m
 
@@ -53,11 +54,19 @@ def chord_of(segs):
 
 @helper
 def bending_axis(chord, wanted, local, world, plane, has_plane):
-    """Unit normal of the bending plane: current chord x wanted chord, kept on the side already bent to.
+    """Unit normal of the bending plane.
 
-    METHODS of the search (see docs/methods.md): with this order and a persistent side both shortening and
-    lengthening converge; the listing's flipping sign folds the spine the wrong way on the way back.
+    A straight trunk bends forward, about the pelvis' X. A bent one stays in its plane: current chord x
+    wanted chord, on the side it is already bent to; with the listing's flipping sign the way back would
+    fold the spine further instead of straightening it. Parallel chords keep the previous plane.
     """
+    bent = (0.0, 0.0, 0.0)  # sum of the interior rotation vectors, in the world
+    for k in range(1, world.shape[0]):
+        q = qt.load(local, k)
+        s = 2.0 if q[3] >= 0.0 else -2.0
+        bent = vec.madd(bent, s, qt.mul_vec(qt.load(world, k - 1), (q[0], q[1], q[2])))
+    if vec.norm(bent) < STRAIGHT:
+        return qt.x_axis(qt.load(world, 0))
     v = vec.cross(vec.unit(chord), vec.unit(wanted))
     length = vec.norm(v)
     if length > ALIGNED:
@@ -65,15 +74,8 @@ def bending_axis(chord, wanted, local, world, plane, has_plane):
     elif has_plane:
         v = plane
     else:
-        v = qt.x_axis(qt.load(world, 0))  # forward flexion
-    bent = (0.0, 0.0, 0.0)
-    for k in range(1, world.shape[0]):
-        q = qt.load(local, k)
-        s = 2.0 if q[3] >= 0.0 else -2.0
-        bent = vec.madd(bent, s, qt.mul_vec(qt.load(world, k - 1), (q[0], q[1], q[2])))
-    if vec.dot(bent, v) < -1e-9:
-        v = vec.scale(-1.0, v)
-    return v
+        v = qt.x_axis(qt.load(world, 0))
+    return vec.scale(-1.0, v) if vec.dot(bent, v) < 0.0 else v
 
 
 @helper
