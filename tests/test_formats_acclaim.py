@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import recordings
 from scipy.spatial.transform import Rotation
-from test_formats_bvh import assert_same, make_motion
 
+from conftest import recordings
 from sixpoint import formats
 from sixpoint.body.dofs import Hinges
 from sixpoint.body.motion import Motion
 from sixpoint.errors import FormatError
-from sixpoint.formats.asf import WIDE_OPEN, read_asf
+from sixpoint.formats.acclaim_bones import WIDE_OPEN
+from sixpoint.formats.asf import read_asf
+from test_formats_bvh import assert_same, make_motion
 
 ASF = """# a comment
 :version 1.10
@@ -156,7 +157,7 @@ def test_skeleton_is_found_and_said(file: Path, caplog: pytest.LogCaptureFixture
     assert formats.find_skeleton(file) == folder / "s_01.ASF"
     with pytest.raises(FormatError, match=r"s\.asf, s_01\.ASF|s_01\.ASF, s\.asf.*--skeleton FILE\.asf"):
         formats.find_skeleton(folder / "other.amc")
-    with pytest.raises(FormatError, match="no .asf beside it"):
+    with pytest.raises(FormatError, match=r"no \.asf beside it"):
         formats.find_skeleton(folder / "none" / "other.amc")
     assert len(formats.load(file, skeleton=folder / "s.asf")) == 3
 

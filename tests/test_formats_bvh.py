@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import recordings
 from scipy.spatial.transform import Rotation
 
+from conftest import recordings
 from sixpoint import formats
+from sixpoint.body.anthropometry import build_skeleton
 from sixpoint.body.motion import FileSpace, Motion
 from sixpoint.body.roles import find_roles
 from sixpoint.body.skeleton import Skeleton
@@ -152,7 +153,7 @@ def test_round_trip_at_gimbal_lock(tmp_path: Path) -> None:
 def test_large_worlds_keep_their_precision(tmp_path: Path) -> None:
     """Positions ten kilometres from the origin come back to 1e-7 m."""
     motion = make_motion()
-    motion = replace(motion, translations=motion.translations + [1e4, -2e4, 3e3])
+    motion = replace(motion, translations=motion.translations + np.array([1e4, -2e4, 3e3]))
     formats.save(motion, tmp_path / "a.bvh")
     again = formats.load(tmp_path / "a.bvh", unit="cm", up="y")
     np.testing.assert_allclose(again.translations[:, 0], motion.translations[:, 0], rtol=0, atol=1e-7)
@@ -225,7 +226,10 @@ def test_recordings_are_human(path: Path) -> None:
     assert 20 < motion.rate < 130 and motion.rate == round(motion.rate)
 
 
-@pytest.mark.parametrize("path", recordings("misc/*.bvh") + recordings("xsens/*.bvh") + recordings("bandai/*bow*"))
+RIGS = [*recordings("misc/*.bvh"), *recordings("xsens/*.bvh"), *recordings("bandai/*bow*.bvh")]
+
+
+@pytest.mark.parametrize("path", RIGS)
 def test_recordings_survive_writing(path: Path, tmp_path: Path) -> None:
     """Read, write, read gives the same motion, unit and up axis."""
     with warnings.catch_warnings():
@@ -301,7 +305,7 @@ def test_a_cut_file_says_so(file: Path) -> None:
         file.write_text(BVH[:end])
         with pytest.raises(FormatError):
             formats.load(file)
-    with pytest.raises(FormatError, match="truncated.*write Frames: 1"):
+    with pytest.raises(FormatError, match=r"truncated.*write Frames: 1"):
         formats.load(file)
 
 
@@ -333,7 +337,7 @@ def test_other_places_are_refused(tmp_path: Path) -> None:
         formats.load(tmp_path / "a.bvh", up="x")
     with pytest.raises(FormatError, match="unknown Euler order"):
         formats.save(make_motion(), tmp_path / "b.bvh", order="ABC")
-    with pytest.raises(FormatError, match="belongs to an .amc"):
+    with pytest.raises(FormatError, match=r"belongs to an \.amc"):
         formats.load(tmp_path / "a.bvh", skeleton="a.asf")
 
 
@@ -363,6 +367,20 @@ def test_unit_from_stature(stature: float, unit: float) -> None:
     """A human's size tells the unit."""
     assert guess_unit(stature) == pytest.approx(unit)
     assert guess_unit(67) == 0.0254 and guess_unit(17.0) == 0.1 and guess_unit(0.0) == 1.0
+
+
+@pytest.mark.parametrize("unit", list(UNITS))
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_space_of_a_human_is_found(tmp_path: Path, unit: str, up: str) -> None:
+    """A standing figure tells its own unit and up axis, and is the same figure whatever they were."""
+    skeleton = build_skeleton()
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (3, len(skeleton), 1))
+    motion = Motion(skeleton, rotations, np.tile(skeleton.offsets[0], (3, 1, 1)), 30.0)
+    formats.save(motion, tmp_path / "a.bvh", unit=unit, up=up)
+    again = formats.load(tmp_path / "a.bvh")
+    assert again.space.up == up and again.space.unit == pytest.approx(UNITS[unit])
+    assert again.space.unit_source == again.space.up_source == "guessed"
+    assert_same(motion, again)
 
 
 def test_very_deep_trees_load(tmp_path: Path) -> None:

@@ -90,7 +90,8 @@ def test_rate_from_a_comment(tmp_path: Path) -> None:
 def test_rounded_times_are_uniform(tmp_path: Path) -> None:
     """Times rounded to milliseconds give the rate without a warning; uneven ones warn."""
     rows = [",".join([f"{k / 60:.3f}", *["0"] * 18]) for k in range(600)]
-    assert formats.load_targets(write(tmp_path, "\n".join([HEADER, *rows]))).rate == pytest.approx(60, rel=1e-3)
+    rate = formats.load_targets(write(tmp_path, "\n".join([HEADER, *rows]))).rate
+    assert rate == pytest.approx(60, rel=1e-3)
     del rows[100:150]
     with pytest.warns(UserWarning, match="not uniform"):
         rate = formats.load_targets(write(tmp_path, "\n".join([HEADER, *rows]))).rate

@@ -20,8 +20,9 @@ from sixpoint.formats.amc import find_skeleton, read_acclaim
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.bvh import read_bvh
 from sixpoint.formats.bvh_write import format_bvh
+from sixpoint.formats.npz import format_npz, read_npz
 from sixpoint.formats.space import detect_space, enter_world, leave_world, parse_unit, parse_up
-from sixpoint.formats.tables import format_csv, format_npz, read_csv, read_npz
+from sixpoint.formats.tables import format_csv, read_csv
 
 __all__ = ["find_skeleton", "load", "load_targets", "save", "save_targets"]
 

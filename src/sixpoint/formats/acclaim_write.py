@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sixpoint.body.motion import Motion
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.errors import FormatError, listed
-from sixpoint.formats.asf import LINK, SITE
+from sixpoint.formats.acclaim_bones import LINK, SITE
 from sixpoint.formats.bvh_write import ANGLE_DECIMALS, compute_angles, length_decimals
 from sixpoint.formats.space import INCH
 

@@ -118,7 +118,7 @@ def _read_frames(path: Path, lines: Sequence[str], header: _Header, channels: in
         warnings.warn(
             f"{path}:{header.line}: {header.frames} frames declared, but the file holds {len(rows)}; "
             "all are read",
-            stacklevel=5,
+            stacklevel=4,
         )
     return parse_rows(path, rows, [k + 1 for k in numbers], "frame values")
 

@@ -1,13 +1,12 @@
-"""Six-point targets as tables: CSV for people and spreadsheets, NPZ for programs.
+"""Six-point targets as CSV tables.
 
-CSV: ``time,pelvis_x,pelvis_y,pelvis_z,head_x,...`` in metres, Y up; optional ``<effector>_qx,_qy,_qz,_qw``
-world rotations. Columns may come in any order; an empty cell or NaN is a lost point. The rate follows from
-``time`` [s], or from a comment ``# rate 60`` above the header.
+The header is ``time,pelvis_x,pelvis_y,pelvis_z,head_x,...`` in metres, Y up, with optional world
+rotations ``<effector>_qx,_qy,_qz,_qw``. Columns may come in any order; an empty cell or NaN is a lost
+point. The rate follows from ``time`` [s], or from a comment ``# rate 60`` above the header.
 """
 
 from __future__ import annotations
 
-import io
 import re
 import warnings
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import FormatError, TargetError, listed
-from sixpoint.formats.source import LARGEST, parse_number, read_bytes, read_lines
+from sixpoint.formats.source import LARGEST, parse_number, read_lines
 
 Array = NDArray[np.float64]
 
@@ -57,7 +56,7 @@ def read_csv(path: Path, rate: float | None = None) -> Targets:
     positions = np.stack([columns[name] for name in POSITION_COLUMNS], axis=1).reshape(-1, 6, 3)
     positions[np.isnan(positions).any(axis=2)] = np.nan
     rotations = _read_rotations(path, table)
-    return _make_targets(path, positions, rate or _find_rate(path, table), rotations)
+    return make_targets(path, positions, rate or _find_rate(path, table), rotations)
 
 
 def _read_table(path: Path) -> _Table:
@@ -145,7 +144,7 @@ def _read_rotations(path: Path, table: _Table) -> Array | None:
     nothing = np.full(len(table.lines), np.nan)
     columns = [table.columns.get(name, nothing) for name in ROTATION_COLUMNS]
     rotations = np.stack(columns, axis=1).reshape(-1, 6, 4)
-    frame, effector = _find_bad_rotation(rotations)
+    frame, effector = find_bad_rotation(rotations)
     if frame is not None:
         raise FormatError(
             path,
@@ -156,7 +155,7 @@ def _read_rotations(path: Path, table: _Table) -> Array | None:
     return np.asarray(rotations / np.linalg.norm(rotations, axis=2, keepdims=True))
 
 
-def _find_bad_rotation(rotations: Array) -> tuple[int | None, int]:
+def find_bad_rotation(rotations: Array) -> tuple[int | None, int]:
     """First (frame, effector) whose quaternion is neither absent nor of about unit length."""
     bad = np.abs(np.linalg.norm(rotations, axis=2) - 1.0) > 0.01
     bad |= np.isnan(rotations).any(axis=2) & ~np.isnan(rotations).all(axis=2)
@@ -213,54 +212,8 @@ def _rate_of_times(path: Path, times: Array) -> float:
     return float(round(rate)) if round(rate) and abs(rate - round(rate)) < 1e-5 * rate else rate
 
 
-def read_npz(path: Path, rate: float | None = None) -> Targets:
-    """Read six-point targets from an NPZ file with ``positions``, ``rate`` and optional ``rotations``.
-
-    Raises:
-        FormatError: Not an NPZ file, missing or wrong arrays.
-    """
-    arrays = _load_arrays(path)
-    for name in ("positions",) if rate else ("positions", "rate"):
-        if name not in arrays:
-            raise FormatError(path, f"array {name!r} is missing; arrays: {listed(arrays) or 'none'}")
-    positions = arrays["positions"].copy()
-    if np.any(np.abs(positions) > LARGEST):
-        raise FormatError(path, "positions are far too large", expected="metres, NaN where lost")
-    stated = arrays.get("rate", np.array(rate))
-    if stated.size != 1:
-        raise FormatError(path, "rate must be one number", got=f"shape {stated.shape}")
-    if positions.shape[1:] == (6, 3):
-        positions[np.isnan(positions).any(axis=2)] = np.nan
-    rotations = arrays.get("rotations")
-    if rotations is not None and rotations.shape[1:] == (6, 4):
-        frame, effector = _find_bad_rotation(rotations)
-        if frame is not None:
-            raise FormatError(
-                path, f"rotations[{frame}, {effector}] ({EFFECTORS[effector]}) is not a unit quaternion"
-            )
-        rotations = rotations / np.linalg.norm(rotations, axis=2, keepdims=True)
-    return _make_targets(path, positions, rate or float(stated.reshape(-1)[0]), rotations)
-
-
-def _load_arrays(path: Path) -> dict[str, Array]:
-    data = read_bytes(path)
-    arrays: dict[str, Array] = {}
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            for name in archive.files:
-                if name in ("positions", "rate", "rotations"):
-                    array = archive[name]
-                    if array.dtype.kind not in "fiu":
-                        raise FormatError(path, f"array {name!r} is not numeric", got=str(array.dtype))
-                    arrays[name] = array.astype(np.float64)
-    except FormatError:
-        raise
-    except Exception as error:  # NumPy and zipfile raise many kinds on damaged archives
-        raise FormatError(path, f"not an NPZ file, or a damaged one: {error}") from error
-    return arrays
-
-
-def _make_targets(path: Path, positions: Array, rate: float, rotations: Array | None) -> Targets:
+def make_targets(path: Path, positions: Array, rate: float, rotations: Array | None) -> Targets:
+    """Targets, with what is wrong with them put down to the file."""
     try:
         return Targets(positions, rate, rotations, path.stem)
     except TargetError as error:
@@ -279,13 +232,3 @@ def format_csv(targets: Targets) -> str:
     lines.append(",".join(names))
     lines += [(row % tuple(values)).replace("nan", "") for values in np.hstack(blocks).tolist()]
     return "\n".join(lines) + "\n"
-
-
-def format_npz(targets: Targets) -> bytes:
-    """The bytes of an NPZ file."""
-    arrays: dict[str, Array] = {"positions": targets.positions, "rate": np.array(targets.rate)}
-    if targets.rotations is not None:
-        arrays["rotations"] = targets.rotations
-    stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-    return stream.getvalue()
