@@ -13,7 +13,7 @@ from sixpoint.kernels.swing_twist import clamp
 
 
 @helper
-def solve_clavicle(start, clavicle, target, reach, limits, table, ball):
+def solve_clavicle(start, clavicle, target, reach, limits, balls, ball):
     """Turn the clavicle so that the stretched arm just reaches.
 
     Args:
@@ -22,8 +22,8 @@ def solve_clavicle(start, clavicle, target, reach, limits, table, ball):
         target: Wrist target from the sternoclavicular joint, in the parent's frame [m].
         reach: Length of the stretched arm [m].
         limits: Whether joint limits hold.
-        table: Swing and twist limits.
-        ball: Row of the clavicle in ``table``.
+        balls: Swing and twist limits.
+        ball: Row of the clavicle in ``balls``.
 
     Returns:
         Local rotation of the sternoclavicular joint.
@@ -45,5 +45,5 @@ def solve_clavicle(start, clavicle, target, reach, limits, table, ball):
         return start
     turned = qt.mul(qt.from_axis_angle(vec.unit(normal), current - wanted), start)
     if limits:
-        turned, _ = clamp(table, ball, turned)
+        turned, _ = clamp(balls, ball, turned)
     return turned

@@ -1,8 +1,8 @@
 """One frame of Sequential IK, in the order of the paper: pelvis, spine, legs, clavicles, arms.
 
 State between frames: ``local`` (rows, 4) are the anatomical local rotations of the posed joints and
-``memory`` (5, 3) holds the estimated X axis, the bending plane's normal, the positions of pelvis and
-head, and the flags (any frame yet, any bending plane yet, unused).
+``memory`` (5, 3) holds the estimated X axis, the bending plane's normal (zero if none), the positions of
+pelvis and head, and in its last row whether there was a frame before.
 
 Reference: Unzueta et al. 2008, Algorithm 1.
 """
@@ -39,7 +39,7 @@ class Settings(NamedTuple):
 
 
 @helper
-def fill_lost(points, known, filled, local, memory, world, segs, model):
+def fill_lost(points, known, filled, memory, neutral_chord):
     """Copy the points; a lost pelvis or head follows the other, or stays where it was.
 
     Returns whether any of the six is lost.
@@ -54,7 +54,7 @@ def fill_lost(points, known, filled, local, memory, world, segs, model):
             lost = True
     if not (known[0] and known[1]):
         has_state = memory[4, 0] > 0.0
-        neutral = (0.0, model.neutral_chord, 0.0)
+        neutral = (0.0, neutral_chord, 0.0)
         chord = vec.sub(vec.load(memory, 3), vec.load(memory, 2)) if has_state else neutral
         if known[1]:
             vec.store(filled, 0, vec.sub(vec.load(filled, 1), chord))
@@ -67,94 +67,121 @@ def fill_lost(points, known, filled, local, memory, world, segs, model):
 
 
 @helper
-def solve_trunk(model, settings, pelvis, head, x_estimated, y, local, memory, scratch):
+def solve_trunk(
+    segments, bend, turns, chords, balls, limits, literal, align, pelvis, head, x_estimated, y, local, memory,
+    world, segs, start, flat,
+):
     """Pelvis and spine (Algorithm 2); returns the pelvis joint's position. ``y`` is the chord's direction."""
-    world, segs, start, flat = scratch
     goal = vec.sub(head, pelvis)
     wanted = vec.norm(goal)
     # The trunk starts with the spine of the frame before and the pelvis as just estimated (Algorithm 1).
     qt.store(local, 0, qt.from_axes(x_estimated, y, vec.cross(x_estimated, y)))
-    spine.place_trunk(model, local, world, segs)
-    v, has_plane = spine.set_chord(
-        model, wanted, goal, settings, local, start, world, segs, flat,
-        vec.load(memory, 1), memory[4, 1] > 0.0,
+    v = spine.set_chord(
+        segments, bend, turns, chords, balls, limits, literal, wanted, goal, local, world, segs, start, flat,
+        vec.load(memory, 1),
     )
     vec.store(memory, 1, v)
-    memory[4, 1] = 1.0 if has_plane else 0.0
+    if limits:  # line 15; it changes no rotation of the pelvis, so it may come before line 14
+        spine.clamp_interior(balls, segments.shape[0], local)
+        spine.place_trunk(segments, local, world, segs)
     root = qt.load(local, 0)
     # Line 14: the pelvis' X axis along the estimate. A half turn goes about its own Y.
     turn = qt.arc(qt.x_axis(root), x_estimated, qt.y_axis(root))
-    if settings.limits:
-        spine.clamp_interior(model, local)  # line 15
-        spine.place_trunk(model, local, world, segs)
     chord = spine.chord_of(segs)
     length = vec.norm(chord)
     if length > 1e-9:  # line 16
-        turned = vec.unit(qt.mul_vec(turn, chord))
-        turn = qt.mul(qt.arc(turned, y, x_estimated), turn)
-        if settings.align_pelvis:  # optional: twist about the chord, X as near to the estimate as it gets
+        turn = qt.mul(qt.arc(vec.unit(qt.mul_vec(turn, chord)), y, x_estimated), turn)
+        if align:  # twist about the chord until X is as near to the estimate as it gets
             x = vec.reject(qt.x_axis(qt.mul(turn, root)), y)
             half = 0.5 * atan2(vec.dot(vec.cross(x, x_estimated), y), vec.dot(x, x_estimated))
             turn = qt.mul((sin(half) * y[0], sin(half) * y[1], sin(half) * y[2], cos(half)), turn)
     qt.store(local, 0, qt.normalised(qt.mul(turn, root)))
-    spine.place_trunk(model, local, world, segs)
+    spine.place_trunk(segments, local, world, segs)
     return vec.madd(pelvis, 0.5 * (wanted - length), y)  # line 17
 
 
 @helper
-def solve_one_limb(model, settings, limb, parent, place, target, local):
-    """Pose limb 0 to 3 (left arm, right arm, left leg, right leg); returns its end's position."""
-    base = model.segments.shape[0]
-    side = limb % 2
-    h = -1.0 if limb < 2 else 1.0
-    ball = base + (2 if limb < 2 else 6) + side
+def pose_limb(lengths, hinges, balls, limits, limb, row, h, parent, place, target, local):
+    """Pose one limb whose root joint has the given row; returns its end's position."""
     root, hinge, end = solve_limb(
         qt.inv_mul_vec(parent, vec.sub(target, place)),
-        model.lengths[limb, 0], model.lengths[limb, 1], h,
-        settings.limits, model.balls, ball, model.hinges[limb, 0], model.hinges[limb, 1],
+        lengths[limb, 0], lengths[limb, 1], h, limits, balls, row, hinges[limb, 0], hinges[limb, 1],
     )
-    qt.store(local, ball, root)
-    qt.store(local, ball + 2, hinge)
+    qt.store(local, row, root)
+    qt.store(local, row + 2, hinge)
     return vec.add(place, qt.mul_vec(parent, end))
 
 
 @helper
-def solve_frame(model, settings, points, known, filled, local, memory, residual, scratch):
+def pose_arm(
+    chest, girdle, clavicles, lengths, hinges, balls, limits, hold, side, root, target, world, segs, local
+):
+    """Clavicle and arm of one side; returns the wrist's position."""
+    row = segs.shape[0] + side
+    place = root
+    for k in range(chest[side]):
+        place = vec.add(place, vec.load(segs, k))
+    frame = qt.load(world, chest[side])
+    joint = vec.add(place, qt.mul_vec(frame, vec.load(girdle, side)))
+    clavicle = solve_clavicle(
+        qt.load(local, row) if hold else qt.IDENTITY,
+        vec.load(clavicles, side),
+        qt.inv_mul_vec(frame, vec.sub(target, joint)),
+        lengths[side, 0] + lengths[side, 1], limits, balls, row,
+    )
+    qt.store(local, row, clavicle)
+    frame = qt.mul(frame, clavicle)
+    shoulder = vec.add(joint, qt.mul_vec(frame, vec.load(clavicles, side)))
+    return pose_limb(lengths, hinges, balls, limits, side, row + 2, -1.0, frame, shoulder, target, local)
+
+
+@helper
+def solve_frame(model, settings, points, local, memory, residual, scratch):
     """Solve one frame; updates ``local``, ``memory`` and ``residual`` (6,) [m] in place.
 
     Returns:
         Status: CONVERGED, UNREACHABLE (a residual above 1 cm) or LOST (some point is unknown).
     """
-    world, segs = scratch[0], scratch[1]
-    lost = fill_lost(points, known, filled, local, memory, world, segs, model)
+    world, segs, start, flat, filled, known = scratch
+    count = segs.shape[0]
+    lost = fill_lost(points, known, filled, memory, model.chords[0])
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     y = vec.sub(head, pelvis)
     y = vec.unit(y) if vec.norm(y) > 1e-9 else qt.y_axis(qt.load(local, 0))
     x = estimate_x(
         filled, known, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3
     )
-    root = solve_trunk(model, settings, pelvis, head, x, y, local, memory, scratch)
-    chord_end = vec.add(root, spine.chord_of(segs))
+    root = solve_trunk(
+        model.segments, model.bend, model.turns, model.chords, model.balls,
+        settings.limits, settings.literal, settings.align_pelvis,
+        pelvis, head, x, y, local, memory, world, segs, start, flat,
+    )
+    top = vec.add(root, spine.chord_of(segs))
     vec.store(memory, 0, x)
     vec.store(memory, 2, root)
-    vec.store(memory, 3, chord_end)
+    vec.store(memory, 3, top)
     memory[4, 0] = 1.0
     residual[0] = vec.norm(vec.sub(pelvis, root)) if known[0] else 0.0
-    residual[1] = vec.norm(vec.sub(head, chord_end)) if known[1] else 0.0
-    for side in range(2):  # legs
-        frame = qt.load(world, 0)
-        place = vec.add(root, qt.mul_vec(frame, vec.load(model.hips, side)))
-        residual[4 + side] = 0.0
-        if known[4 + side]:
-            target = vec.load(filled, 4 + side)
-            end = solve_one_limb(model, settings, 2 + side, frame, place, target, local)
-            residual[4 + side] = vec.norm(vec.sub(target, end))
-    for side in range(2):  # clavicles and arms
-        residual[2 + side] = 0.0
-        if known[2 + side]:
-            target = vec.load(filled, 2 + side)
-            end = solve_arm(model, settings, side, root, target, world, segs, local)
-            residual[2 + side] = vec.norm(vec.sub(target, end))
+    residual[1] = vec.norm(vec.sub(head, top)) if known[1] else 0.0
+    for limb in range(4):  # legs, then clavicles and arms; neither depends on the other
+        side, effector = limb % 2, 4 + limb % 2 if limb < 2 else limb
+        residual[effector] = 0.0
+        if not known[effector]:
+            continue
+        target = vec.load(filled, effector)
+        if limb < 2:
+            frame = qt.load(world, 0)
+            place = vec.add(root, qt.mul_vec(frame, vec.load(model.hips, side)))
+            end = pose_limb(
+                model.lengths, model.hinges, model.balls, settings.limits, 2 + side, count + 6 + side, 1.0,
+                frame, place, target, local,
+            )
+        else:
+            end = pose_arm(
+                model.chest, model.girdle, model.clavicles, model.lengths, model.hinges, model.balls,
+                settings.limits, settings.hold_clavicles, side, root, target, world, segs, local,
+            )
+        residual[effector] = vec.norm(vec.sub(target, end))
     if lost:
         return LOST
     for i in range(6):
@@ -164,42 +191,21 @@ def solve_frame(model, settings, points, known, filled, local, memory, residual,
 
 
 @helper
-def solve_arm(model, settings, side, root, target, world, segs, local):
-    """Clavicle and arm of one side; returns the wrist's position."""
-    base = model.segments.shape[0]
-    chest = model.chest[side]
-    place = root
-    for k in range(chest):
-        place = vec.add(place, vec.load(segs, k))
-    frame = qt.load(world, chest)
-    joint = vec.add(place, qt.mul_vec(frame, vec.load(model.girdle, side)))
-    start = qt.load(local, base + side) if settings.hold_clavicles else qt.IDENTITY
-    clavicle = solve_clavicle(
-        start, vec.load(model.clavicles, side), qt.inv_mul_vec(frame, vec.sub(target, joint)),
-        model.lengths[side, 0] + model.lengths[side, 1], settings.limits, model.balls, base + side,
-    )
-    qt.store(local, base + side, clavicle)
-    frame = qt.mul(frame, clavicle)
-    shoulder = vec.add(joint, qt.mul_vec(frame, vec.load(model.clavicles, side)))
-    return solve_one_limb(model, settings, side, frame, shoulder, target, local)
-
-
-@helper
-def write_rig(model, local, root, rotations, pelvis):
+def write_rig(row, before, after, constant, origin, local, root, rotations, pelvis):
     """Anatomical local rotations -> the rig's local rotations (J, 4) and the pelvis' local position (3,)."""
-    for j in range(model.row.shape[0]):
-        k = model.row[j]
+    for j in range(row.shape[0]):
+        k = row[j]
         if k >= 0:
-            q = qt.mul(qt.load(model.before, j), qt.mul(qt.load(local, k), qt.load(model.after, j)))
+            q = qt.mul(qt.load(before, j), qt.mul(qt.load(local, k), qt.load(after, j)))
             qt.store(rotations, j, q)
         else:
-            qt.store(rotations, j, qt.load(model.constant, j))
+            qt.store(rotations, j, qt.load(constant, j))
     for i in range(3):
-        pelvis[i] = root[i] - model.pelvis_origin[i]
+        pelvis[i] = root[i] - origin[i]
 
 
 @entry
-def solve_frames(model, settings, points, local, memory, rotations, pelvis, status, residual):
+def solve_frames(model, settings, points, local, memory, scratch, rotations, pelvis, status, residual):
     """Solve F frames in order.
 
     Args:
@@ -208,19 +214,29 @@ def solve_frames(model, settings, points, local, memory, rotations, pelvis, stat
         points: (F, 6, 3) effector positions [m]; NaN where lost.
         local: (rows, 4) state, updated.
         memory: (5, 3) state, updated.
+        scratch: See ``make_scratch``.
         rotations: (F, J, 4) out, local rotations of the rig.
         pelvis: (F, 3) out, local position of the pelvis joint [m].
         status: (F,) out.
         residual: (F, 6) out, distance of each effector to its target [m]; 0 where lost.
     """
-    count = model.segments.shape[0]
-    scratch = (np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 4)), np.empty((count, 2)))
-    known, filled = np.zeros(6, np.bool_), np.zeros((6, 3))
     for f in range(points.shape[0]):
         status[f] = solve_frame(
-            model, settings, points[f], known, filled, local, memory, residual[f], scratch
+            model, settings, points[f], local, memory, residual[f], scratch
         )
-        write_rig(model, local, vec.load(memory, 2), rotations[f], pelvis[f])
+        write_rig(
+            model.row, model.before, model.after, model.constant, model.pelvis_origin, local, vec.load(memory, 2), rotations[f], pelvis[f],
+        )
+
+
+def make_scratch(segments):
+    """Working arrays for a trunk of so many segments.
+
+    World rotations, segment vectors, rotations to bend from, components in the bending plane, the six
+    points with lost ones filled in, and which are known.
+    """
+    shapes = ((segments, 4), (segments, 3), (segments, 4), (segments, 2), (6, 3))
+    return (*(np.empty(shape) for shape in shapes), np.empty(6, np.bool_))
 
 
 def weights_at_rate(weights, dt):

@@ -23,7 +23,7 @@ def point_at(u):
 
 
 @helper
-def solve_limb(target, l1, l2, h, limits, table, ball, flexion_low, flexion_high):
+def solve_limb(target, l1, l2, h, limits, balls, ball, flexion_low, flexion_high):
     """Pose one limb.
 
     Args:
@@ -32,8 +32,8 @@ def solve_limb(target, l1, l2, h, limits, table, ball, flexion_low, flexion_high
         l2: Lower length [m].
         h: -1 elbow, +1 knee.
         limits: Whether joint limits hold.
-        table: Swing and twist limits.
-        ball: Row of the root joint in ``table``.
+        balls: Swing and twist limits.
+        ball: Row of the root joint in ``balls``.
         flexion_low: Least flexion [rad].
         flexion_high: Largest flexion [rad].
 
@@ -56,16 +56,16 @@ def solve_limb(target, l1, l2, h, limits, table, ball, flexion_low, flexion_high
     hinge = (h * bend_sin, 0.0, 0.0, bend_cos)
     if not limits:
         return root, hinge, vec.scale(d, u)
-    limited, changed = clamp(table, ball, root)  # line 6
+    limited, changed = clamp(balls, ball, root)  # line 6
     flexion = 2.0 * atan2(bend_sin, bend_cos)
     if not changed and flexion_low <= flexion <= flexion_high:
         return root, hinge, vec.scale(d, u)
     # Line 7, elbow-torso avoidance, belongs here.
-    return _close_on(limited, target, l1, l2, h, table, ball, flexion_low, flexion_high)
+    return _close_on(limited, target, l1, l2, h, balls, ball, flexion_low, flexion_high)
 
 
 @helper
-def _close_on(root, target, l1, l2, h, table, ball, flexion_low, flexion_high):
+def _close_on(root, target, l1, l2, h, balls, ball, flexion_low, flexion_high):
     """Lines 8-12: turn the clamped upper segment about itself and flex, as near to the target as it gets."""
     y = qt.y_axis(root)
     reach = vec.madd(target, l1, y)  # from the middle joint to the target; the segment runs along -y
@@ -75,7 +75,7 @@ def _close_on(root, target, l1, l2, h, table, ball, flexion_low, flexion_high):
         aim = vec.scale(-h / vec.norm(v), v)
         half = 0.5 * atan2(vec.dot(vec.cross(z, aim), y), vec.dot(z, aim))
         root = qt.mul(root, (0.0, sin(half), 0.0, cos(half)))  # line 9
-        root, _ = clamp(table, ball, root)  # line 10
+        root, _ = clamp(balls, ball, root)  # line 10
     z, y = qt.z_axis(root), qt.y_axis(root)
     flexion = atan2(-h * vec.dot(reach, z), -vec.dot(reach, y))  # line 11
     flexion = min(max(flexion, flexion_low), flexion_high)  # line 12

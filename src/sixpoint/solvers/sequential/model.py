@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
 from sixpoint.body.figure import Figure
-from sixpoint.kernels.swing_twist import BallTable, build_ball_table
+from sixpoint.kernels.swing_twist import build_ball_rows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -30,18 +30,18 @@ class Model(NamedTuple):
 
     Attributes:
         segments: (S, 3) trunk segments from the pelvis to the head.
-        neutral_chord: Distance pelvis-head in the neutral pose.
         bend: (S, 3) share of the pelvis' bending angle that each segment turns by (eq. 1), and the cosine
             and sine of that share of one coarse step.
-        stretch_axes: (S, 3) axes about which the segments turn towards the chord.
-        stretch_angles: (S,) angle of each when the trunk is fully stretched [rad].
-        stretch_chords: (33,) chord length of the precomputed stretch poses, not decreasing [m].
+        turns: (S, 4) axis, and angle [rad] when the trunk is fully stretched, of each segment's turn
+            towards the chord.
+        chords: (33,) chord length of the precomputed stretch poses, not decreasing [m]; the first is the
+            neutral pose's.
         hips: (2, 3) hips from the pelvis.
         chest: (2,) trunk joint that carries each arm.
         girdle: (2, 3) clavicle joint (or shoulder, without clavicles) from the place of that trunk joint.
         clavicles: (2, 3) shoulder from the clavicle joint; zero without clavicles.
         lengths: (4, 2) upper and lower length of left arm, right arm, left leg, right leg.
-        balls: Limits of the posed rows; rows of hinges are unlimited there.
+        balls: Limits of the posed rows, see ``kernels.swing_twist``; rows of hinges are unlimited there.
         hinges: (4, 2) least and largest flexion of the four limbs [rad], positive.
         row: (J,) posed row of each rig joint, -1 for joints that keep their neutral rotation.
         before: (J, 4) inverse of the neutral rotation of each rig joint's parent.
@@ -52,17 +52,15 @@ class Model(NamedTuple):
     """
 
     segments: Array
-    neutral_chord: float
     bend: Array
-    stretch_axes: Array
-    stretch_angles: Array
-    stretch_chords: Array
+    turns: Array
+    chords: Array
     hips: Array
     chest: Index
     girdle: Array
     clavicles: Array
     lengths: Array
-    balls: BallTable
+    balls: Array
     hinges: Array
     row: Index
     before: Array
@@ -81,7 +79,7 @@ def build_model(figure: Figure) -> Model:
     roles, chain = figure.roles, figure.spine_chain
     segments = np.ascontiguousarray(chain.segments)
     chest, girdle, clavicles = _arms(figure)
-    axes, angles, chords = _stretch_poses(segments)
+    turns, chords = _stretch_poses(segments)
     row = np.full(len(figure.skeleton), -1, np.int64)
     for k, joint in enumerate((*chain.joints, *_limb_joints(figure))):
         if joint >= 0:
@@ -100,17 +98,15 @@ def build_model(figure: Figure) -> Model:
         origin = figure.skeleton.offsets[figure.skeleton.path(0, int(parent))].sum(axis=0)
     return Model(
         segments=segments,
-        neutral_chord=float(np.linalg.norm(segments.sum(axis=0))),
         bend=np.stack([share, np.cos(share * COARSE_STEP), np.sin(share * COARSE_STEP)], axis=1),
-        stretch_axes=axes,
-        stretch_angles=angles,
-        stretch_chords=chords,
+        turns=turns,
+        chords=chords,
         hips=np.array([figure.offset_between(roles.pelvis, h) for h in roles.hip]),
         chest=chest,
         girdle=girdle,
         clavicles=clavicles,
         lengths=np.array(lengths),
-        balls=build_ball_table([_limit(figure, j) for j in (*chain.joints, *_limb_joints(figure))]),
+        balls=build_ball_rows([_limit(figure, j) for j in (*chain.joints, *_limb_joints(figure))]),
         hinges=np.array([_flexion(figure, chain_[1]) for chain_ in roles.limbs]),
         row=row,
         before=before,
@@ -152,7 +148,7 @@ def _arms(figure: Figure) -> tuple[Index, Array, Array]:
     return chest, girdle, clavicles
 
 
-def _stretch_poses(segments: Array) -> tuple[Array, Array, Array]:
+def _stretch_poses(segments: Array) -> tuple[Array, Array]:
     """Turn every segment towards the chord by a common fraction; chord length at 33 fractions.
 
     Reference: Unzueta et al. 2008, Algorithm 2, line 11 ("the corresponding pre-recorded pose").
@@ -167,4 +163,4 @@ def _stretch_poses(segments: Array) -> tuple[Array, Array, Array]:
     fractions = np.linspace(0.0, 1.0, STRETCH_POSES)
     turned = rot.mul_vec(rot.from_axis_angle(axes, fractions[:, None] * angles), segments)
     chords = np.maximum.accumulate(np.linalg.norm(turned.sum(axis=1), axis=1))
-    return axes, angles, chords
+    return np.column_stack([axes, angles]), chords

@@ -19,7 +19,7 @@ from sixpoint.body.targets import Targets, as_points
 from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
-from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, solve_frames, weights_at_rate
+from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, make_scratch, solve_frames, weights_at_rate
 from sixpoint.solvers.sequential.model import build_model
 
 Array = NDArray[np.float64]
@@ -85,7 +85,8 @@ class SequentialIK:
         rotations, pelvis = np.empty((1, joints, 4)), np.empty((1, 3))
         status, residual = np.empty(1, np.int64), np.empty((1, 6))
         solve_frames(
-            self._model, self._settings(dt), frame[None], local, memory, rotations, pelvis, status, residual
+            self._model, self._settings(dt), frame[None], local, memory, self._scratch(),
+            rotations, pelvis, status, residual,
         )
         moving, translations = self._place(pelvis)
         pose = Pose(self.figure.skeleton, rotations[0], translations[0], moving)
@@ -102,12 +103,12 @@ class SequentialIK:
         rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
         status, residual = np.empty(frames, np.int64), np.empty((frames, 6))
         local, memory = self._start()
-        settings = self._settings(1.0 / targets.rate)
+        settings, scratch = self._settings(1.0 / targets.rate), self._scratch()
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             solve_frames(
-                self._model, settings, targets.positions[part], local, memory,
+                self._model, settings, targets.positions[part], local, memory, scratch,
                 rotations[part], pelvis[part], status[part], residual[part],
             )
             if progress:
@@ -138,6 +139,9 @@ class SequentialIK:
 
     def _start(self) -> tuple[Array, Array]:
         return np.tile(rot.IDENTITY, (self._model.rows, 1)), np.zeros((MEMORY_ROWS, 3))
+
+    def _scratch(self) -> tuple[NDArray[np.generic], ...]:
+        return make_scratch(len(self._model.segments))  # type: ignore[no-any-return]
 
     def _place(self, pelvis: Array) -> tuple[tuple[int, ...], Array]:
         """Which joints translate and where to; a root above the pelvis stands still."""

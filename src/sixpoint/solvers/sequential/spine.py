@@ -23,14 +23,14 @@ EXACT = 1e-10  # m
 
 
 @helper
-def place_trunk(model, local, world, segs):
+def place_trunk(segments, local, world, segs):
     """World rotations and segments of the trunk from its local rotations."""
     q = qt.load(local, 0)
-    for k in range(model.segments.shape[0]):
+    for k in range(segments.shape[0]):
         if k > 0:
             q = qt.mul(q, qt.load(local, k))
         qt.store(world, k, q)
-        vec.store(segs, k, qt.mul_vec(q, vec.load(model.segments, k)))
+        vec.store(segs, k, qt.mul_vec(q, vec.load(segments, k)))
 
 
 @helper
@@ -53,7 +53,7 @@ def chord_of(segs):
 
 
 @helper
-def bending_axis(chord, wanted, local, world, plane, has_plane):
+def bending_axis(chord, wanted, local, world, plane):
     """Unit normal of the bending plane.
 
     A straight trunk bends forward, about the pelvis' X. A bent one stays in its plane: current chord x
@@ -71,7 +71,7 @@ def bending_axis(chord, wanted, local, world, plane, has_plane):
     length = vec.norm(v)
     if length > ALIGNED:
         v = vec.scale(1.0 / length, v)
-    elif has_plane:
+    elif vec.norm(plane) > 0.5:
         v = plane
     else:
         v = qt.x_axis(qt.load(world, 0))
@@ -130,7 +130,7 @@ def search_angle(bend, flat, along, wanted, literal):
     while not passed and steps < COARSE_CAP:
         phi += step * COARSE
         steps += 1
-        squared = _coarse(bend, flat, phi)
+        squared = flat_chord(bend, flat, phi)[0]
         before, length = length, sqrt(squared + along * along)
         passed = sign * squared <= sign * goal
         gap = abs(length - wanted)
@@ -159,11 +159,6 @@ def search_angle(bend, flat, along, wanted, literal):
 
 
 @helper
-def _coarse(bend, flat, phi):
-    return flat_chord(bend, flat, phi)[0]
-
-
-@helper
 def _refine(bend, flat, goal, inside, outside, along):
     """Newton's method kept inside the bracket; f = chord squared minus goal."""
     f_inside = flat_chord(bend, flat, inside)[0] - goal
@@ -184,20 +179,20 @@ def _refine(bend, flat, goal, inside, outside, along):
 
 
 @helper
-def turn_trunk(model, v, phi, world, segs):
+def turn_trunk(bend, v, phi, world, segs):
     """Turn every segment by its share of phi about v."""
     for k in range(world.shape[0]):
-        q = qt.from_axis_angle(v, model.bend[k, 0] * phi)
+        q = qt.from_axis_angle(v, bend[k, 0] * phi)
         qt.store(world, k, qt.mul(q, qt.load(world, k)))
         vec.store(segs, k, qt.mul_vec(q, vec.load(segs, k)))
 
 
 @helper
-def clamp_interior(model, local):
-    """Set the interior joints within their limits; whether any was outside."""
+def clamp_interior(balls, count, local):
+    """Set the interior ones of ``count`` trunk joints within their limits; whether any was outside."""
     any_changed = False
-    for k in range(1, model.segments.shape[0]):
-        q, changed = clamp(model.balls, k, qt.load(local, k))
+    for k in range(1, count):
+        q, changed = clamp(balls, k, qt.load(local, k))
         if changed:
             qt.store(local, k, q)
             any_changed = True
@@ -205,32 +200,32 @@ def clamp_interior(model, local):
 
 
 @helper
-def _clamped_chord(model, v, phi, start, world, segs, local):
+def _clamped_chord(segments, bend, balls, v, phi, start, world, segs, local):
     """Chord length after turning the trunk from ``start`` (local rotations) by phi within the limits."""
     for k in range(world.shape[0]):
         qt.store(local, k, qt.load(start, k))
-    place_trunk(model, local, world, segs)
-    turn_trunk(model, v, phi, world, segs)
+    place_trunk(segments, local, world, segs)
+    turn_trunk(bend, v, phi, world, segs)
     read_trunk(world, local)
-    clamp_interior(model, local)
-    place_trunk(model, local, world, segs)
+    clamp_interior(balls, world.shape[0], local)
+    place_trunk(segments, local, world, segs)
     return vec.norm(chord_of(segs))
 
 
 @helper
-def search_within_limits(model, v, wanted, start, world, segs, local):
+def search_within_limits(segments, bend, balls, v, wanted, start, world, segs, local):
     """Algorithm 3 with the limits inside the loop: coarse steps, then bisection of the last one.
 
     ``start`` holds the local rotations to bend from. Leaves the trunk at the best angle found.
     """
-    length = _clamped_chord(model, v, 0.0, start, world, segs, local)
+    length = _clamped_chord(segments, bend, balls, v, 0.0, start, world, segs, local)
     sign = 1.0 if length > wanted else -1.0
     step, phi, best_phi, best_gap = -sign * COARSE, 0.0, 0.0, abs(length - wanted)
     passed, flipped = False, False
     steps = 0
     while steps < COARSE_CAP:
         before = length
-        length = _clamped_chord(model, v, phi + step, start, world, segs, local)
+        length = _clamped_chord(segments, bend, balls, v, phi + step, start, world, segs, local)
         steps += 1
         if sign * length <= sign * wanted:
             passed = True
@@ -248,17 +243,17 @@ def search_within_limits(model, v, wanted, start, world, segs, local):
         low, high = phi, phi + step
         for _ in range(24):
             middle = 0.5 * (low + high)
-            length = _clamped_chord(model, v, middle, start, world, segs, local)
+            length = _clamped_chord(segments, bend, balls, v, middle, start, world, segs, local)
             if sign * length > sign * wanted:
                 low = middle
             else:
                 high = middle
         best_phi = high
-    return abs(_clamped_chord(model, v, best_phi, start, world, segs, local) - wanted) < 1e-4
+    return abs(_clamped_chord(segments, bend, balls, v, best_phi, start, world, segs, local) - wanted) < 1e-4
 
 
 @helper
-def unbend(model, wanted, start, world, segs, local):
+def unbend(segments, wanted, start, world, segs, local):
     """Lengthen a trunk bent in another plane: shrink all interior rotations by one factor, by bisection."""
     low, high = 0.0, 1.0  # fraction of the bend that is kept
     for _ in range(30):
@@ -266,7 +261,7 @@ def unbend(model, wanted, start, world, segs, local):
         qt.store(local, 0, qt.load(start, 0))
         for k in range(1, world.shape[0]):
             qt.store(local, k, qt.scaled(qt.load(start, k), kept))
-        place_trunk(model, local, world, segs)
+        place_trunk(segments, local, world, segs)
         if vec.norm(chord_of(segs)) > wanted:
             low = kept
         else:
@@ -274,56 +269,63 @@ def unbend(model, wanted, start, world, segs, local):
 
 
 @helper
-def stretch(model, wanted, local):
-    """Interior rotations, and the pelvis' own turn, of the precomputed stretch pose of a chord length."""
-    chords = model.stretch_chords
+def stretch(turns, chords, wanted, local):
+    """Interior rotations, and the pelvis' own turn, of the precomputed stretch pose of a chord length.
+
+    ``turns`` (S, 4) are axis and full angle of each segment, ``chords`` the lengths of the precomputed poses.
+    """
     last = chords.shape[0] - 1
     k = 0
     while k < last - 1 and chords[k + 1] < wanted:
         k += 1
     width = chords[k + 1] - chords[k]
-    fraction = 0.0 if width < 1e-12 else (wanted - chords[k]) / width
-    if width < 1e-12 and wanted > chords[k]:
-        fraction = 1.0
-    t = min(max((k + min(max(fraction, 0.0), 1.0)) / last, 0.0), 1.0)
+    fraction = 1.0 if wanted > chords[k] else 0.0
+    if width > 1e-12:
+        fraction = min(max((wanted - chords[k]) / width, 0.0), 1.0)
+    t = (k + fraction) / last
     before = qt.IDENTITY
-    for k in range(model.segments.shape[0]):
-        q = qt.from_axis_angle(vec.load(model.stretch_axes, k), t * model.stretch_angles[k])
-        if k == 0:
-            qt.store(local, 0, qt.mul(qt.load(local, 0), q))
-        else:
-            qt.store(local, k, qt.inv_mul(before, q))
+    for k in range(turns.shape[0]):
+        q = qt.from_axis_angle(vec.load(turns, k), t * turns[k, 3])
+        base = qt.load(local, 0) if k == 0 else qt.inv(before)
+        qt.store(local, k, qt.mul(base, q))
         before = q
 
 
 @helper
-def set_chord(model, wanted, chord_goal, settings, local, start, world, segs, flat, plane, has_plane):
+def set_chord(
+    segments, bend, turns, chords, balls, limits, literal, wanted, goal, local, world, segs, start, flat, plane
+):
     """Give the trunk the wanted chord length (Algorithm 2, lines 4 to 13).
 
+    ``local`` holds the spine of the frame before and the pelvis as estimated. ``plane`` is the previous
+    bending plane's normal, zero if there is none.
+
     Returns:
-        The bending plane's normal used, and whether there is one to remember.
+        The normal of the bending plane to remember.
     """
-    count = model.segments.shape[0]
-    if wanted >= model.neutral_chord or count < 2:
-        if count > 1:
-            # A precomputed pose replaces the trunk's shape; the pelvis starts from its neutral relation.
-            stretch(model, wanted, local)
-        place_trunk(model, local, world, segs)
-        return plane, has_plane
-    if vec.norm(chord_of(segs)) > model.neutral_chord:
+    count = segments.shape[0]
+    if count < 2:
+        place_trunk(segments, local, world, segs)
+        return plane
+    if wanted >= chords[0]:  # beyond the neutral chord
+        stretch(turns, chords, wanted, local)
+        place_trunk(segments, local, world, segs)
+        return plane
+    place_trunk(segments, local, world, segs)
+    if vec.norm(chord_of(segs)) > chords[0]:
         for k in range(1, count):
             qt.store(local, k, qt.IDENTITY)
-        place_trunk(model, local, world, segs)
+        place_trunk(segments, local, world, segs)
     for k in range(count):
         qt.store(start, k, qt.load(local, k))
-    v = bending_axis(chord_of(segs), chord_goal, local, world, plane, has_plane)
+    chord = chord_of(segs)
+    v = bending_axis(chord, goal, local, world, plane)
     along = plane_components(segs, v, flat)
-    lengthening = vec.norm(chord_of(segs)) < wanted
-    phi, met = search_angle(model.bend, flat, along, wanted, settings.literal)
-    turn_trunk(model, v, phi, world, segs)
+    phi, met = search_angle(bend, flat, along, wanted, literal)
+    turn_trunk(bend, v, phi, world, segs)
     read_trunk(world, local)
-    if settings.limits and clamp_interior(model, local):
-        met = search_within_limits(model, v, wanted, start, world, segs, local)
-    if not met and lengthening:
-        unbend(model, wanted, start, world, segs, local)
-    return v, True
+    if limits and clamp_interior(balls, count, local):
+        met = search_within_limits(segments, bend, balls, v, wanted, start, world, segs, local)
+    if not met and vec.norm(chord) < wanted:
+        unbend(segments, wanted, start, world, segs, local)
+    return v
