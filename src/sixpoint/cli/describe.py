@@ -1,0 +1,124 @@
+"""Motions, targets, figures and errors in words and numbers, for the screen."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.jobs.reading import Opened
+from sixpoint.jobs.solving import Solved
+from sixpoint.solvers.base import Status
+from sixpoint.study.metrics import Errors
+
+Row = tuple[str, str]
+
+_UNITS = {1.0: "m", 0.01: "cm", 0.001: "mm", 0.0254: "inch", 0.0254 / 0.45: "cmu"}
+_SOURCES = {"guessed": "guessed", "file": "from the file", "given": "given", "convention": "by convention"}
+
+
+def describe_length(frames: int, rate: float) -> str:
+    """Frames, rate and duration."""
+    return f"{plural(frames, 'frame')} at {rate:g} Hz, {frames / rate:.2f} s"
+
+
+def describe_space(opened: Opened) -> list[Row]:
+    """Unit and up axis of a file, and how they are known."""
+    space = opened.motion.space
+    name = next((n for u, n in _UNITS.items() if math.isclose(u, space.unit, rel_tol=1e-6)), "")
+    unit = f"{name} ({space.unit:.6g} m)" if name not in ("", "m") else f"{space.unit:.6g} m"
+    guess = " (--unit to change)" if space.unit_source == "guessed" else ""
+    up = " (--up to change)" if space.up_source == "guessed" else ""
+    return [
+        ("unit", f"{unit}, {_SOURCES.get(space.unit_source, space.unit_source)}{guess}"),
+        ("up axis", f"{space.up}, {_SOURCES.get(space.up_source, space.up_source)}{up}"),
+    ]
+
+
+def describe_skeleton_file(opened: Opened) -> list[Row]:
+    """The ASF that was used, if any."""
+    if opened.skeleton is None:
+        return []
+    return [("skeleton", f"{opened.skeleton}, {'found beside the file' if opened.searched else 'given'}")]
+
+
+def describe_figure(figure: Figure) -> list[Row]:
+    """How the anatomy of a rig was found and what it is like."""
+    r = figure.roles
+    names = figure.skeleton.names
+    head = f"{'the end site of' if any(r.head_offset) else 'the joint'} {names[r.head]}"
+    clavicles = "with clavicles" if r.clavicle else "without clavicles"
+    return [
+        ("roles", f"found by {r.found_by}; head is {head}; {clavicles}"),
+        ("spine", f"{plural(len(r.spine), 'joint')}: {' '.join(names[j] for j in r.spine)}"),
+        ("height", f"{figure.height:.3f} m (calf + thigh + pelvis + torso + neck)"),
+    ]
+
+
+def describe_errors(errors: Errors) -> list[Row]:
+    """How far the result is from the recording."""
+    mean, degrees = 100 * errors.distances.mean(), math.degrees(errors.orientation)
+    joints = plural(len(errors.joints), "joint")
+    return [
+        ("position error", f"{errors.position:.4f} of the height; {mean:.2f} cm mean of {joints}"),
+        ("orientation error", f"{errors.orientation:.3f} rad ({degrees:.1f} deg)"),
+    ]
+
+
+def describe_solved(solved: Solved, targets: Targets) -> list[Row]:
+    """How the six points were met."""
+    residual = solved.solution.residual
+    frame, effector = np.unravel_index(int(residual.argmax()), residual.shape)
+    worst = f"{100 * residual.max():.2f} cm ({EFFECTORS[effector]}, frame {frame})"
+    rows = [("effectors", f"worst {worst}; mean {100 * residual.mean():.3f} cm")]
+    rows.append(("frames", frames_met(solved)))
+    lost = ~targets.tracked
+    if lost.any():
+        rows.append(("lost points", _shares(lost)))
+    return [*rows, ("speed", f"{microseconds(solved)} us per frame")]
+
+
+def frames_met(solved: Solved) -> str:
+    """How many frames ended in which status."""
+    count = solved.solution.count
+    reached, missed, lost = (count(s) for s in (Status.CONVERGED, Status.UNREACHABLE, Status.LOST))
+    text = f"{reached} reached"
+    if missed:
+        text += f", {missed} not reached (a target beyond the body's reach or limits)"
+    if lost:
+        text += f", {lost} with lost points"
+    return text
+
+
+def microseconds(solved: Solved) -> str:
+    """Time per frame [us]."""
+    return f"{solved.seconds * 1e6:.1f}"
+
+
+def describe_box(points: NDArray[np.float64]) -> str:
+    """Range of points (..., 3) [m] along each axis; NaN is left out."""
+    flat = points.reshape(-1, 3)
+    flat = flat[np.isfinite(flat).all(axis=1)]
+    if not len(flat):
+        return "nothing tracked"
+    pairs = zip("xyz", flat.min(axis=0), flat.max(axis=0), strict=True)
+    return ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in pairs) + " m"
+
+
+def _shares(lost: NDArray[np.bool_]) -> str:
+    counts = zip(EFFECTORS, lost.sum(axis=0), strict=True)
+    return ", ".join(f"{name} in {plural(int(n), 'frame')}" for name, n in counts if n)
+
+
+def describe_files(files: list[Path]) -> str:
+    """What was written."""
+    return "wrote " + ", ".join(str(path) for path in files)
+
+
+def plural(count: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -1,0 +1,126 @@
+"""``sixpoint reconstruct``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from sixpoint.cli.options import Force, Frames, LimitsFile, Mapping, NoLimits, Rate, Unit, Up
+from sixpoint.cli.screen import Screen
+
+if TYPE_CHECKING:
+    from sixpoint.jobs.reconstruct import Reconstruction
+
+
+def reconstruct(
+    file: Annotated[Path, Parameter(help="A motion (.bvh, .amc) or six points (.csv, .npz).")],
+    /,
+    *,
+    out: Annotated[
+        Path | None,
+        Parameter(
+            name=("--out", "-o"),
+            help="A .bvh, or an .amc with its .asf; by default `<name>_<method>.bvh` in this folder.",
+        ),
+    ] = None,
+    skeleton: Annotated[
+        Path | None,
+        Parameter(help="For an .amc: its .asf. For six points: the rig to pose (.bvh, .asf, .amc)."),
+    ] = None,
+    stature: Annotated[
+        float | None, Parameter(help="For six points: stature of the built-in figure [m]; 1.75 by default.")
+    ] = None,
+    frames: Frames = None,
+    method: Annotated[str, Parameter(help="How to solve.")] = "sik",
+    weights: Annotated[
+        str | None,
+        Parameter(
+            help="Influence of wrists, ankles and the last frame on the turn of the pelvis: 1,1,0 by "
+            "default, as for boxing and kicks; 0.1,0.1,1 for walking and climbing."
+        ),
+    ] = None,
+    search: Annotated[
+        Literal["exact", "literal"] | None, Parameter(help="How the bend of the spine is found.")
+    ] = None,
+    limits: LimitsFile = None,
+    no_limits: NoLimits = False,
+    mapping: Mapping = None,
+    extras: Annotated[
+        bool, Parameter(negative="", help="Copy fingers, toes and face from the recording.")
+    ] = False,
+    picture: Annotated[
+        Path | None, Parameter(help="Also draw the result over the recording, to this .png.")
+    ] = None,
+    unit: Unit = None,
+    up: Up = None,
+    rate: Rate = None,
+    force: Force = False,
+) -> None:
+    """Pose a whole body from six points, and write it.
+
+    Of a motion the six points are taken, and the result is measured against it. Six points alone are
+    posed on the rig of --skeleton, or on the built-in figure; they are in metres and Y up.
+
+    For example:
+
+    ```
+    sixpoint reconstruct 17_10.amc -o boxing.bvh --picture boxing.png
+    sixpoint reconstruct 90_05.bvh --frames 1: --extras
+    sixpoint reconstruct walk.bvh --weights 0.1,0.1,1
+    sixpoint reconstruct points.csv --stature 1.68
+    sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
+    ```
+    """
+    from sixpoint.jobs.reading import ALL, Reading, parse_frames
+    from sixpoint.jobs.reconstruct import Body
+    from sixpoint.jobs.reconstruct import reconstruct as run
+    from sixpoint.jobs.solving import Solving, parse_weights
+
+    solving = Solving(
+        method,
+        None if weights is None else parse_weights(weights),
+        search,
+        limits=not no_limits,
+        limits_file=limits,
+    )
+    reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
+    screen = Screen()
+    with screen.progress() as progress:
+        done = run(
+            file,
+            out,
+            reading=reading,
+            solving=solving,
+            body=Body(skeleton, stature, mapping),
+            extras=extras,
+            picture=picture,
+            force=force,
+            progress=progress,
+        )
+    _show(screen, file, done, stature)
+
+
+def _show(screen: Screen, file: Path, done: Reconstruction, stature: float | None) -> None:
+    from sixpoint.cli import describe
+    from sixpoint.jobs.reconstruct import STATURE
+
+    screen.say(f"{file}: {describe.describe_length(len(done.targets), done.targets.rate)}", style="bold")
+    if done.opened is None:
+        chosen = "" if stature else "; give your own with --stature or --skeleton"
+        screen.rows([("figure", f"built-in, {stature or STATURE:g} m tall{chosen}")])
+    else:
+        joints = describe.plural(len(done.figure.skeleton), "joint")
+        screen.rows(
+            [
+                *describe.describe_skeleton_file(done.opened),
+                ("rig", joints if done.errors else f"{joints} of {done.opened.motion.name}"),
+                *describe.describe_figure(done.figure),
+                *describe.describe_space(done.opened),
+            ]
+        )
+    errors = describe.describe_errors(done.errors) if done.errors else []
+    screen.say("result", style="bold")
+    screen.rows([*errors, *describe.describe_solved(done.solved, done.targets)])
+    screen.say(describe.describe_files(done.files), style="green")

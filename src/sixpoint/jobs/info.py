@@ -1,0 +1,59 @@
+"""What does a file hold? Reads it and looks for a human in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.targets import Targets
+from sixpoint.errors import FigureError
+from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
+
+
+@dataclass(frozen=True, eq=False)
+class MotionInfo:
+    """A motion file.
+
+    Attributes:
+        path: The file.
+        opened: What was read.
+        figure: The anatomy of its rig; None where the rig is not a human's.
+        problem: Why there is no figure.
+    """
+
+    path: Path
+    opened: Opened
+    figure: Figure | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class TargetsInfo:
+    """A targets file."""
+
+    path: Path
+    targets: Targets
+
+
+def inspect(
+    path: Path, *, reading: Reading | None = None, mapping: Path | None = None
+) -> MotionInfo | TargetsInfo:
+    """Read a file and find out what it holds.
+
+    Args:
+        path: A motion or targets.
+        reading: How to read it.
+        mapping: A TOML table role -> joint name for what cannot be found.
+
+    Raises:
+        FormatError: It cannot be read, or the mapping cannot. A rig that is not a human's is no error.
+    """
+    reading = reading or Reading()
+    if is_targets(path):
+        return TargetsInfo(path, open_targets(path, reading))
+    opened = open_motion(path, reading)
+    try:
+        return MotionInfo(path, opened, Figure.from_motion(opened.whole, mapping))
+    except FigureError as error:
+        return MotionInfo(path, opened, None, str(error))

@@ -1,0 +1,171 @@
+"""Six points to a whole body: of a recording, to be compared with it, or of tracked targets.
+
+A recording gives the points and is the truth: the result is measured against it, on the same rig. Targets
+have no truth; they are posed on a rig that is given, or on the built-in figure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.motion import Motion
+from sixpoint.body.targets import Targets
+from sixpoint.errors import FormatError, SixpointError
+from sixpoint.formats import MOTION_SUFFIXES, save
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
+from sixpoint.jobs.solving import Solved, Solving, solve
+from sixpoint.jobs.writing import check_output
+from sixpoint.study.metrics import Errors, compute_errors
+
+OUTPUTS = (".bvh", ".amc")
+STATURE = 1.75
+"""Stature of the built-in figure where none is given [m]."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Whom to pose.
+
+    Attributes:
+        rig: A motion file whose rig is posed for targets; None: the built-in figure.
+        stature: Of the built-in figure [m]; None: ``STATURE``.
+        mapping: A TOML table role -> joint name, for an unusual rig.
+    """
+
+    rig: Path | None = None
+    stature: float | None = None
+    mapping: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What came out.
+
+    Attributes:
+        figure: Who was posed.
+        opened: The recording, or the rig of the targets; None for the built-in figure.
+        targets: The six points.
+        solved: Postures, status and residuals.
+        errors: Against the recording; None for targets.
+        files: What was written.
+    """
+
+    figure: Figure
+    opened: Opened | None
+    targets: Targets
+    solved: Solved
+    errors: Errors | None
+    files: list[Path]
+
+
+def reconstruct(
+    source: Path,
+    out: Path | None = None,
+    *,
+    reading: Reading | None = None,
+    solving: Solving | None = None,
+    body: Body | None = None,
+    extras: bool = False,
+    picture: Path | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Reconstruction:
+    """Reconstruct a motion from its six points, or pose a figure for targets.
+
+    Args:
+        source: A motion or targets.
+        out: A .bvh, or an .amc with its .asf beside it; by default ``<stem>_<method>.bvh`` here.
+        reading: How to read the source.
+        solving: Method and options.
+        body: Whom to pose; for a motion only the mapping counts, the rig is its own.
+        extras: Copy fingers, toes and face from the recording.
+        picture: A .png that shows the result over the recording.
+        force: Overwrite existing files.
+        progress: Told how far the work is.
+
+    Raises:
+        SixpointError: Nothing was written; the message says why.
+    """
+    reading, solving, body = reading or Reading(), solving or Solving(), body or Body()
+    solving.check()
+    out = out or Path(f"{source.stem}_{solving.method}.bvh")
+    points_only = is_targets(source)
+    _check_request(points_only, body, extras, picture)
+    files = check_output(out, OUTPUTS, force, "for the six points: sixpoint convert")
+    files += check_output(picture, (".png",), force) if picture else []
+    if points_only:
+        figure, opened, targets = _prepare_targets(source, reading, solving, body)
+    else:
+        figure, opened, targets = _prepare_motion(source, reading, solving, body)
+    solved = solve(figure, targets, solving, progress)
+    like = opened.motion if opened else None
+    truth = None if points_only else like
+    result = finish(solved.solution.motion, figure, like, truth if extras else None)
+    errors = compute_errors(figure, truth, result) if truth else None
+    save(replace(result, name=out.stem), out, force=force)
+    if picture and truth:
+        _draw(figure, truth, result, picture, solving.method)
+    return Reconstruction(figure, opened, targets, solved, errors, files)
+
+
+def finish(result: Motion, figure: Figure, like: Motion | None, extras: Motion | None) -> Motion:
+    """A result in the file space of a recording, with that of another's fingers, toes and face.
+
+    Args:
+        result: Solved postures on the figure's rig.
+        figure: Who was posed.
+        like: The motion whose unit and up axis are kept when it is written.
+        extras: The recording whose joints beyond wrists, ankles and head are copied.
+    """
+    if like is not None:
+        result = replace(result, space=like.space)
+    if extras is not None:
+        rotations = result.rotations.copy()
+        rotations[:, figure.extremities] = extras.rotations[:, figure.extremities]
+        result = replace(result, rotations=rotations)
+    return result
+
+
+def _check_request(points_only: bool, body: Body, extras: bool, picture: Path | None) -> None:
+    if points_only:
+        if extras:
+            raise SixpointError("--extras copies from a recording; targets hold six points only")
+        if picture:
+            raise SixpointError("--picture compares with a recording; targets have none")
+        if body.rig is not None and body.stature is not None:
+            raise SixpointError("--skeleton and --stature exclude each other")
+    elif body.stature is not None:
+        raise SixpointError("--stature is for targets; a motion is posed on its own rig")
+
+
+def _prepare_motion(
+    source: Path, reading: Reading, solving: Solving, body: Body
+) -> tuple[Figure, Opened | None, Targets]:
+    limits = solving.load_limits()
+    opened = open_motion(source, replace(reading, skeleton=body.rig))
+    figure = Figure.from_motion(opened.whole, body.mapping, limits)
+    return figure, opened, figure.targets(opened.motion)
+
+
+def _prepare_targets(
+    source: Path, reading: Reading, solving: Solving, body: Body
+) -> tuple[Figure, Opened | None, Targets]:
+    limits = solving.load_limits()
+    targets = open_targets(source, reading)
+    if body.rig is None:
+        if body.mapping is not None:
+            raise SixpointError("--mapping names joints of a rig: give the rig with --skeleton")
+        return Figure.from_stature(body.stature or STATURE, limits), None, targets
+    if body.rig.suffix.lower() not in MOTION_SUFFIXES:
+        raise FormatError(body.rig, "the rig of targets is a .bvh, .asf or .amc file")
+    opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))
+    return Figure.from_motion(opened.whole, body.mapping, limits), opened, targets
+
+
+def _draw(figure: Figure, truth: Motion, result: Motion, picture: Path, method: str) -> None:
+    from sixpoint.study.plots import draw_comparison  # Matplotlib is slow to import
+
+    draw_comparison(figure, truth, result, picture, title=f"{truth.name}: {method}")

@@ -1,0 +1,100 @@
+"""How a job solves: method, options and limits, checked before any file is read."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.limits import Limits
+from sixpoint.body.targets import Targets
+from sixpoint.errors import SixpointError, listed
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.solvers.base import MotionSolution
+from sixpoint.solvers.registry import SOLVERS, make_solver
+
+
+@dataclass(frozen=True)
+class Solving:
+    """How to solve.
+
+    Attributes:
+        method: A name of ``SOLVERS``.
+        weights: Influence of wrists, ankles and the last frame on the pelvis; None: the method's own.
+        search: "exact" or "literal"; None: the method's own.
+        limits: Keep joints within their limits.
+        limits_file: A table of joint limits in place of the shipped one.
+    """
+
+    method: str = "sik"
+    weights: tuple[float, float, float] | None = None
+    search: str | None = None
+    limits: bool = True
+    limits_file: Path | None = None
+
+    def check(self) -> None:
+        """Refuse a method that does not exist, and options it does not have.
+
+        Raises:
+            SixpointError: The message lists the methods, or the options of the method.
+        """
+        if self.method not in SOLVERS:
+            raise SixpointError(f"no method named {self.method!r}; methods: {listed(SOLVERS)}")
+        if not self.limits and self.limits_file is not None:
+            raise SixpointError("--limits FILE and --no-limits exclude each other")
+        known = inspect.signature(SOLVERS[self.method]).parameters
+        unknown = [name for name in self.options if name not in known]
+        if unknown:
+            raise SixpointError(f"the method {self.method!r} has no option {listed(unknown)}")
+        make_solver(self.method, Figure.from_stature(), **self.options)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Keyword arguments of the solver, only what was asked for."""
+        options: dict[str, Any] = {} if self.limits else {"limits": False}
+        for name in ("weights", "search"):
+            if getattr(self, name) is not None:
+                options[name] = getattr(self, name)
+        return options
+
+    def load_limits(self) -> Limits | None:
+        """The joint limits asked for; None is the shipped table."""
+        return None if self.limits_file is None else Limits.load(self.limits_file)
+
+
+def parse_weights(text: str) -> tuple[float, float, float]:
+    """Weights as ``1,1,0``."""
+    try:
+        first, second, third = (float(word) for word in text.split(","))
+    except ValueError:
+        raise SixpointError(
+            "weights are three numbers: wrists, ankles and memory of the last frame, e.g. 1,1,0 or "
+            f"0.1,0.1,1; got {text!r}"
+        ) from None
+    return first, second, third
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a solver made of targets.
+
+    Attributes:
+        solution: Postures, status and residual of each frame.
+        seconds: Time per frame, kernels compiled [s].
+    """
+
+    solution: MotionSolution
+    seconds: float
+
+
+def solve(figure: Figure, targets: Targets, solving: Solving, progress: Progress = silent) -> Solved:
+    """Pose a figure for every frame; kernels are compiled before the clock starts."""
+    solver = make_solver(solving.method, figure, **solving.options)
+    solver.warm_up()
+    solver.solve_frames(targets.sliced(slice(0, 1)))  # arrays of the kind that follow
+    start = time.perf_counter()
+    solution = solver.solve_frames(targets, lambda done: progress("solving", done, len(targets)))
+    return Solved(solution, (time.perf_counter() - start) / len(targets))
