@@ -102,6 +102,6 @@ def open_targets(path: Path, reading: Reading) -> Targets:
 
 def _check_frames(path: Path, frames: slice, count: int) -> None:
     if not len(range(*frames.indices(count))):
-        parts = (frames.start, frames.stop, frames.step or 1)
-        asked = ":".join("" if part is None else str(part) for part in parts)
+        parts = [frames.start, frames.stop, frames.step]
+        asked = ":".join("" if part is None else str(part) for part in parts[: 2 if parts[2] is None else 3])
         raise SixpointError(f"{path}: frames {asked} hold nothing: there are {count}, 0 to {count - 1}")
