@@ -18,6 +18,7 @@ from sixpoint.kernels.jit import helper
 
 FORWARD, SIDE, SWING, TWIST, KNOTS = 3, 6, 9, 12, 14
 TOLERANCE = 1e-12
+NEAR_ANTIPODE = pi / 6
 
 
 @helper
@@ -35,7 +36,10 @@ def swing_limit(row, theta):
 
 @helper
 def clamp(balls, b, q):
-    """Nearest rotation within the limits that keeps theta: swing first, then twist.
+    """Nearest rotation within the limits on the same great circle of swing: swing first, then twist.
+
+    The segment turns back at the same theta, as in the paper, except within 30 degrees of the antipode
+    where the way over it is the shorter one: an arm raised overhead and a little behind the head stays up.
 
     Returns the rotation and whether it had to be changed.
     """
@@ -58,8 +62,12 @@ def clamp(balls, b, q):
         lean = vec.cross(n, axis)
         sideways = vec.dot(lean, (row[SIDE], row[SIDE + 1], row[SIDE + 2]))
         onward = vec.dot(lean, (row[FORWARD], row[FORWARD + 1], row[FORWARD + 2]))
-        limit = swing_limit(row, atan2(sideways, onward))
+        theta = atan2(sideways, onward)
+        limit = swing_limit(row, theta)
         if psi > limit + TOLERANCE:
+            if psi > pi - NEAR_ANTIPODE:
+                beyond = swing_limit(row, theta - pi if theta > 0.0 else theta + pi)
+                limit = -beyond if 2.0 * pi - psi - beyond < psi - limit else limit
             swing = qt.from_axis_angle(n, limit)
             changed = True
     low, high = row[TWIST], row[TWIST + 1]

@@ -24,6 +24,8 @@ from sixpoint.solvers.sequential.model import build_model
 
 Array = NDArray[np.float64]
 
+FIGHTING = (1.0, 1.0, 0.0)
+WALKING = (0.1, 0.1, 1.0)
 CHUNK = 512  # frames between two reports of progress
 
 log = logging.getLogger("sixpoint")
@@ -36,7 +38,8 @@ class SequentialIK:
         figure: What to pose.
         weights: Influence of the wrists' line, the ankles' line and the previous frame on the pelvis' X
             axis (w1, w2, w3), as in the paper at 120 Hz; the memory of w3 is kept at any frame rate.
-            The paper takes (1, 1, 0) for boxing and kicks, (0.1, 0.1, 1) for walking and climbing.
+            The paper takes ``FIGHTING`` = (1, 1, 0) for boxing and kicks and ``WALKING`` = (0.1, 0.1, 1),
+            the steadier default, for walking and climbing.
         limits: Keep every joint within the figure's limits.
         search: "exact" meets the chord length of the bent spine by Newton's method; "literal" steps by
             0.1 and 0.01 rad as Algorithm 3 does.
@@ -54,7 +57,7 @@ class SequentialIK:
         self,
         figure: Figure,
         *,
-        weights: tuple[float, float, float] = (1.0, 1.0, 0.0),
+        weights: tuple[float, float, float] = WALKING,
         limits: bool = True,
         search: Literal["exact", "literal"] = "exact",
         clavicles: Literal["neutral", "hold"] = "neutral",
