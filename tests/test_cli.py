@@ -73,7 +73,7 @@ def test_demo_writes_files_and_refuses_to_overwrite_them(tmp_path, monkeypatch, 
     written = sorted(path.name for path in (tmp_path / "demo").iterdir())
     assert written == ["walk.png", "walk_points.csv", "walk_result.bvh", "walk_truth.bvh"]
     assert "walk" in out
-    assert "orientation" in out
+    assert "us/frame" in out
     assert "next:" in out
     code, _, err = run(capsys, "demo", "--sample", "walk")
     assert (code, err.count("\n")) == (2, 1)
@@ -128,6 +128,10 @@ def test_reconstruct_lost_points(place, capsys):
     assert code == 0
     assert "10 with lost points" in out
     assert "r_wrist in 10 frames" in out
+    sp.save_targets(sp.Targets(np.full_like(points, np.nan), targets.rate), "nothing.csv")
+    code, out, _ = run(capsys, "reconstruct", "nothing.csv")
+    assert code == 0
+    assert "nothing tracked" in out
 
 
 def test_reconstruct_draws_a_picture_and_copies_extras(place, capsys):
@@ -222,7 +226,7 @@ def test_info_prints_roles(place, capsys):
     """Info names the joints of the roles, and how they and the unit were found."""
     code, out, _ = run(capsys, "info", "walk.bvh", "--tree")
     assert code == 0
-    for word in ("40 frames at 60 Hz", "cm (0.01 m), guessed", "by names", "left l_knee, right r_knee", "vl5"):
+    for word in ("40 frames at 60 Hz", "(0.01 m), guessed", "by names", "left l_knee, right r_knee", "vl5"):
         assert word in out
 
 

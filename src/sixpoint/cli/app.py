@@ -51,10 +51,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with messages(screen):
             _run(words)
-            sys.stdout.flush()
-        return 0
-    except BrokenPipeError:  # the reader of our output has seen enough, as in: sixpoint info FILE | head
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except KeyboardInterrupt:
         screen.error("interrupted")

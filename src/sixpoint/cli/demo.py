@@ -14,7 +14,14 @@ from sixpoint.cli.screen import Screen
 if TYPE_CHECKING:
     from sixpoint.jobs.demo import DemoClip
 
-COLUMNS = ("clip", "frames", "position", "cm", "orientation", "worst", "not reached", "us/frame")
+COLUMNS = ("clip", "frames", "position", "mean cm", "rad", "worst cm", "missed", "us/frame")
+LEGEND = (
+    ("position", "distance of the joints to the truth, over the figure's height"),
+    ("mean cm", "the same as a mean distance"),
+    ("rad", "angle of the joints to the truth"),
+    ("worst cm", "largest distance of one of the six points to its target"),
+    ("missed", "frames with a point more than 1 cm off: beyond reach or limits"),
+)
 
 def demo(
     *,
@@ -59,8 +66,7 @@ def demo(
         )
     screen.table(COLUMNS, [_row(clip) for clip in clips])
     screen.say()
-    screen.say("position: joint error over the figure's height, as in the paper; cm: mean joint distance;")
-    screen.say("orientation: mean joint angle [rad]; worst: largest distance of an effector to its point.")
+    screen.rows(LEGEND)
     screen.say()
     _point_on(screen, out, clips[0].name)
 
@@ -75,7 +81,7 @@ def _row(clip: DemoClip) -> list[str]:
         f"{clip.errors.position:.4f}",
         f"{100 * clip.errors.distances.mean():.2f}",
         f"{clip.errors.orientation:.3f}",
-        f"{100 * solution.residual.max():.2f} cm",
+        f"{100 * solution.residual.max():.2f}",
         f"{solution.count(Status.UNREACHABLE)}",
         f"{clip.solved.seconds * 1e6:.1f}",
     ]

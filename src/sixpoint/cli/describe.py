@@ -72,11 +72,13 @@ def describe_errors(errors: Errors) -> list[Row]:
 def describe_solved(solved: Solved, targets: Targets) -> list[Row]:
     """How the six points were met."""
     residual = solved.solution.residual
-    frame, effector = np.unravel_index(int(residual.argmax()), residual.shape)
-    worst = f"{100 * residual.max():.2f} cm ({EFFECTORS[effector]}, frame {frame})"
-    rows = [("effectors", f"worst {worst}; mean {100 * residual.mean():.3f} cm")]
-    rows.append(("frames", frames_met(solved)))
     lost = ~targets.tracked
+    met = "nothing tracked"
+    if not lost.all():
+        frame, effector = np.unravel_index(int(residual.argmax()), residual.shape)
+        worst = f"{100 * residual.max():.2f} cm ({EFFECTORS[effector]}, frame {frame})"
+        met = f"worst {worst}; mean {100 * residual[~lost].mean():.3f} cm"
+    rows = [("effectors", met), ("frames", frames_met(solved))]
     if lost.any():
         rows.append(("lost points", _shares(lost)))
     return [*rows, ("speed", f"{microseconds(solved)} us per frame")]
