@@ -60,7 +60,7 @@ def demo(
             out,
             names=sample or (),
             stature=stature,
-            solving=Solving(limits=not no_limits),
+            solving=Solving(weights=job.WEIGHTS, limits=not no_limits),
             force=force,
             progress=progress,
         )

@@ -37,8 +37,8 @@ def reconstruct(
     weights: Annotated[
         str | None,
         Parameter(
-            help="Influence of wrists, ankles and the last frame on the turn of the pelvis: 1,1,0 by "
-            "default, as for boxing and kicks; 0.1,0.1,1 for walking and climbing."
+            help="Influence of wrists, ankles and the last frame on the turn of the pelvis: 1,1,0 for "
+            "boxing and kicks; 0.1,0.1,1, the default, is steadier: walking and climbing."
         ),
     ] = None,
     search: Annotated[
@@ -68,7 +68,7 @@ def reconstruct(
     ```
     sixpoint reconstruct 17_10.amc -o boxing.bvh --picture boxing.png
     sixpoint reconstruct 90_05.bvh --frames 1: --extras
-    sixpoint reconstruct walk.bvh --weights 0.1,0.1,1
+    sixpoint reconstruct kick.bvh --weights 1,1,0
     sixpoint reconstruct points.csv --stature 1.68
     sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
     ```
