@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from independent import read_bvh_positions
 from scipy.spatial.transform import Rotation
 
 from conftest import recordings
@@ -159,56 +160,12 @@ def test_large_worlds_keep_their_precision(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.translations[:, 0], motion.translations[:, 0], rtol=0, atol=1e-7)
 
 
-def compute_positions(path: Path) -> dict[str, np.ndarray]:
-    """Joint positions by a reader of its own: tokens, recursion and rotation matrices."""
-    head, body = path.read_text().split("MOTION")
-    words = head.split()
-    data = np.array([line.split() for line in body.strip().split("\n")[2:]], float)
-    found: dict[str, np.ndarray] = {}
-    at = column = 0
-
-    def read(position: np.ndarray, matrix: np.ndarray) -> None:
-        nonlocal at, column
-        at += 1
-        while words[at] != "}":
-            word = words[at]
-            if word == "OFFSET":
-                local = np.array(words[at + 1 : at + 4], float) * np.ones((len(data), 1))
-                at += 4
-            elif word == "CHANNELS":
-                count = int(words[at + 1])
-                names, at = words[at + 2 : at + 2 + count], at + 2 + count
-                turn = np.tile(np.eye(3), (len(data), 1, 1))
-                for name in names:
-                    value, column = data[:, column], column + 1
-                    if name[1:] == "position":
-                        local[:, "XYZ".index(name[0])] = value
-                    else:
-                        turn = turn @ Rotation.from_euler(name[0], value[:, None], degrees=True).as_matrix()
-                place = position + np.einsum("fij,fj->fi", matrix, local)
-                found[joint[-1]] = place
-                frame = matrix @ turn
-            elif word == "JOINT":
-                joint.append(words[at + 1])
-                at += 2
-                read(place, frame)
-                joint.pop()
-            else:
-                at = words.index("}", at) + 1
-        at += 1
-
-    joint = [words[2]]
-    at = 3
-    read(np.zeros((len(data), 3)), np.tile(np.eye(3), (len(data), 1, 1)))
-    return found
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_written_file_means_the_same_to_another_reader(tmp_path: Path, seed: int) -> None:
     """An independent reader with rotation matrices finds the joints where the motion has them."""
     motion = make_motion(seed, unit=0.01)
     formats.save(motion, tmp_path / "a.bvh", order="XZY")
-    found = compute_positions(tmp_path / "a.bvh")
+    found = read_bvh_positions(tmp_path / "a.bvh")
     for joint, name in enumerate(motion.skeleton.names):
         np.testing.assert_allclose(found[name] * 0.01, motion.positions[:, joint], atol=1e-6)
 

@@ -67,8 +67,8 @@ class Targets:
 
 
 def as_points(points: ArrayLike) -> Array:
-    """One frame of effector positions as a C-contiguous (6, 3) array [m]."""
-    array = np.ascontiguousarray(points, dtype=np.float64)
+    """One frame of effector positions as a new C-contiguous (6, 3) array [m]."""
+    array = np.array(points, dtype=np.float64, order="C")
     if array.shape != (6, 3):
         raise TargetError(f"points must be (6, 3), one row per effector {EFFECTORS}, got {array.shape}")
     return array

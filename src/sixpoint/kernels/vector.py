@@ -34,7 +34,7 @@ def scale(s, a):
 
 @helper
 def madd(a, s, b):
-    """a + s b."""
+    """Sum of a and s times b."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
 
 

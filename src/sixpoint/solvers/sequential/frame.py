@@ -10,8 +10,6 @@ Reference: Unzueta et al. 2008, Algorithm 1.
 from math import atan2, cos, sin
 from typing import NamedTuple
 
-import numpy as np
-
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
@@ -146,8 +144,10 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
     count = segs.shape[0]
     lost = fill_lost(points, known, filled, memory, model.chords[0])
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
-    y = vec.sub(head, pelvis)
-    y = vec.unit(y) if vec.norm(y) > 1e-9 else qt.y_axis(qt.load(local, 0))
+    y = vec.unit(vec.sub(head, pelvis))
+    if vec.norm(y) < 0.5:  # pelvis and head coincide: the trunk keeps its direction
+        y = vec.unit(vec.sub(vec.load(memory, 3), vec.load(memory, 2)))
+        y = y if vec.norm(y) > 0.5 else (0.0, 1.0, 0.0)
     x = estimate_x(
         filled, known, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3
     )
@@ -227,28 +227,3 @@ def solve_frames(model, settings, points, local, memory, scratch, rotations, pel
         write_rig(
             model.row, model.before, model.after, model.constant, model.pelvis_origin, local, vec.load(memory, 2), rotations[f], pelvis[f],
         )
-
-
-def make_scratch(segments):
-    """Working arrays for a trunk of so many segments.
-
-    World rotations, segment vectors, rotations to bend from, components in the bending plane, the six
-    points with lost ones filled in, and which are known.
-    """
-    shapes = ((segments, 4), (segments, 3), (segments, 4), (segments, 2), (6, 3))
-    return (*(np.empty(shape) for shape in shapes), np.empty(6, np.bool_))
-
-
-def weights_at_rate(weights, dt):
-    """Weights that keep, at a frame time dt, the memory they have at 120 Hz.
-
-    The share of new information per frame is b = (w1 + w2) / (w1 + w2 + w3); over equal times the same
-    forgetting needs b' = 1 - (1 - b)^(120 dt). The ratio of w1 to w2 stays.
-    """
-    w1, w2, w3 = weights
-    new = w1 + w2
-    if w3 <= 0.0 or new <= 0.0:
-        return w1, w2, w3
-    share = 1.0 - (w3 / (new + w3)) ** (120.0 * dt)
-    scaled = w3 * share / (1.0 - share) / new
-    return w1 * scaled, w2 * scaled, w3

@@ -77,7 +77,7 @@ class Model(NamedTuple):
 def build_model(figure: Figure) -> Model:
     """Lower a figure."""
     roles, chain = figure.roles, figure.spine_chain
-    segments = np.ascontiguousarray(chain.segments)
+    segments = chain.segments.copy()
     chest, girdle, clavicles = _arms(figure)
     turns, chords = _stretch_poses(segments)
     row = np.full(len(figure.skeleton), -1, np.int64)
@@ -114,6 +114,17 @@ def build_model(figure: Figure) -> Model:
         constant=rot.mul(before, figure.neutral),
         pelvis_origin=origin,
     )
+
+
+def make_scratch(model: Model) -> tuple[NDArray[np.generic], ...]:
+    """Working arrays of one solver call.
+
+    World rotations, segment vectors, rotations to bend from, components in the bending plane, the six
+    points with lost ones filled in, and which are known.
+    """
+    count = len(model.segments)
+    shapes = ((count, 4), (count, 3), (count, 4), (count, 2), (6, 3))
+    return (*(np.empty(shape) for shape in shapes), np.empty(6, np.bool_))
 
 
 def _limb_joints(figure: Figure) -> tuple[int, ...]:

@@ -19,8 +19,8 @@ from sixpoint.body.targets import Targets, as_points
 from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
-from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, make_scratch, solve_frames, weights_at_rate
-from sixpoint.solvers.sequential.model import build_model
+from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, solve_frames
+from sixpoint.solvers.sequential.model import build_model, make_scratch
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,12 @@ class SequentialIK:
             raise SixpointError(f"clavicles is 'neutral' or 'hold', got {clavicles!r}")
         self.figure = figure
         self.weights = (float(weights[0]), float(weights[1]), float(weights[2]))
-        self._options = (bool(limits), search == "literal", clavicles == "hold", bool(align_pelvis))
+        self._options = {
+            "limits": bool(limits),
+            "literal": search == "literal",
+            "hold_clavicles": clavicles == "hold",
+            "align_pelvis": bool(align_pelvis),
+        }
         self._model = build_model(figure)
 
     def solve(self, points: ArrayLike, previous: Solution | None = None, dt: float = 1 / 60) -> Solution:
@@ -88,7 +93,7 @@ class SequentialIK:
         rotations, pelvis = np.empty((1, joints, 4)), np.empty((1, 3))
         status, residual = np.empty(1, np.int64), np.empty((1, 6))
         solve_frames(
-            self._model, self._settings(dt), frame[None], local, memory, self._scratch(),
+            self._model, self._settings(dt), frame[None], local, memory, make_scratch(self._model),
             rotations, pelvis, status, residual,
         )
         moving, translations = self._place(pelvis)
@@ -106,12 +111,13 @@ class SequentialIK:
         rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
         status, residual = np.empty(frames, np.int64), np.empty((frames, 6))
         local, memory = self._start()
-        settings, scratch = self._settings(1.0 / targets.rate), self._scratch()
+        settings, scratch = self._settings(1.0 / targets.rate), make_scratch(self._model)
+        points = targets.positions.copy()  # read-only arrays are another type to Numba: one more compilation
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             solve_frames(
-                self._model, settings, targets.positions[part], local, memory, scratch,
+                self._model, settings, points[part], local, memory, scratch,
                 rotations[part], pelvis[part], status[part], residual[part],
             )
             if progress:
@@ -138,13 +144,10 @@ class SequentialIK:
         self.solve(points)
 
     def _settings(self, dt: float) -> Settings:
-        return Settings(*weights_at_rate(self.weights, dt), *self._options)
+        return Settings(*weights_at_rate(self.weights, dt), **self._options)
 
     def _start(self) -> tuple[Array, Array]:
         return np.tile(rot.IDENTITY, (self._model.rows, 1)), np.zeros((MEMORY_ROWS, 3))
-
-    def _scratch(self) -> tuple[NDArray[np.generic], ...]:
-        return make_scratch(len(self._model.segments))  # type: ignore[no-any-return]
 
     def _place(self, pelvis: Array) -> tuple[tuple[int, ...], Array]:
         """Which joints translate and where to; a root above the pelvis stands still."""
@@ -153,3 +156,23 @@ class SequentialIK:
             return (0,), pelvis[:, None]
         root = np.broadcast_to(self.figure.skeleton.offsets[0], pelvis.shape)
         return (0, joint), np.stack([root, pelvis], axis=1)
+
+
+def weights_at_rate(weights: tuple[float, float, float], dt: float) -> tuple[float, float, float]:
+    """Weights that keep, at a frame time ``dt`` [s], the memory they have at 120 Hz.
+
+    The share of new information per frame is b = (w1 + w2) / (w1 + w2 + w3); over equal times the same
+    forgetting needs b' = 1 - (1 - b)^(120 dt). The ratio of w1 to w2 stays.
+
+    Raises:
+        SixpointError: ``dt`` is not a positive number.
+    """
+    if not (np.isfinite(dt) and dt > 0):
+        raise SixpointError(f"dt is the time since the last frame in seconds, above zero; got {dt}")
+    w1, w2, w3 = weights
+    new = w1 + w2
+    if w3 <= 0.0 or new <= 0.0:
+        return weights
+    kept = (w3 / (new + w3)) ** (120.0 * dt)
+    scale = w3 * (1.0 - kept) / kept / new if kept > 1e-12 else 1e12
+    return w1 * scale, w2 * scale, w3

@@ -1,0 +1,39 @@
+# Everything is done in a virtual environment of the project's own; only Python 3.11+ is needed.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+.PHONY: demo test check benchmark results clean
+
+demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
+	$(BIN)/sixpoint demo --force
+
+test: $(VENV)/dev.stamp  ## Run the tests
+	$(BIN)/python -m pytest
+
+check: $(VENV)/dev.stamp  ## Lint and type-check
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+benchmark: $(VENV)/run.stamp  ## Time a warm solver beside forward kinematics
+	$(BIN)/python benchmarks/speed.py
+
+results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/results.md
+	$(BIN)/python benchmarks/paper_table.py
+
+clean:
+	rm -rf $(VENV) demo
+
+$(VENV)/run.stamp: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "sixpoint needs Python 3.11 or newer; try: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	@echo "installing into $(VENV) (once)"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/dev.stamp: $(VENV)/run.stamp
+	@$(PIP) install --editable '.[dev]'
+	@touch $@
