@@ -14,9 +14,9 @@ OPPOSED = 0.1  # of the sum of weights: below it the directions cancel
 
 
 @helper
-def across(points, left, right, known_left, known_right, y):
+def across(points, left, right, y):
     """Unit direction from the right to the left point across y; zero where it says nothing."""
-    if not (known_left and known_right):
+    if points[left, 3] == 0.0 or points[right, 3] == 0.0:
         return (0.0, 0.0, 0.0)
     v = vec.reject(vec.sub(vec.load(points, left), vec.load(points, right)), y)
     if vec.norm(v) < SHORT:
@@ -25,10 +25,13 @@ def across(points, left, right, known_left, known_right, y):
 
 
 @helper
-def estimate_x(points, known, y, x_previous, has_previous, w1, w2, w3):
-    """X axis of the pelvis, a unit vector perpendicular to y."""
-    wrists = across(points, 2, 3, known[2], known[3], y)
-    ankles = across(points, 4, 5, known[4], known[5], y)
+def estimate_x(points, y, x_previous, has_previous, w1, w2, w3):
+    """X axis of the pelvis, a unit vector perpendicular to y.
+
+    ``points`` (6, 4) are the effectors [m], with a 1 for a known point and a 0 for a lost one.
+    """
+    wrists = across(points, 2, 3, y)
+    ankles = across(points, 4, 5, y)
     before = (0.0, 0.0, 0.0)
     if has_previous:
         before = vec.unit(vec.reject(x_previous, y))

@@ -19,13 +19,15 @@ from sixpoint.body.targets import Targets, as_points
 from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
-from sixpoint.solvers.sequential.frame import MEMORY_ROWS, Settings, solve_frames
-from sixpoint.solvers.sequential.model import build_model, make_scratch
+from sixpoint.solvers.sequential.frame import MEMORY_ROWS, solve_frames
+from sixpoint.solvers.sequential.model import build_model
+from sixpoint.solvers.sequential.packing import LIMB_ROWS, Settings, pack_model, work_rows
 
 Array = NDArray[np.float64]
 
 FIGHTING = (1.0, 1.0, 0.0)
 WALKING = (0.1, 0.1, 1.0)
+STATUSES = tuple(Status)
 CHUNK = 512  # frames between two reports of progress
 
 log = logging.getLogger("sixpoint")
@@ -77,7 +79,12 @@ class SequentialIK:
             "hold_clavicles": clavicles == "hold",
             "align_pelvis": bool(align_pelvis),
         }
-        self._model = build_model(figure)
+        model = build_model(figure)
+        self._arrays = (*pack_model(model), model.balls, model.chords)
+        self._work = (work_rows(len(model.segments)), 4)
+        self._start = np.zeros((len(model.segments) + LIMB_ROWS + MEMORY_ROWS, 4))
+        self._start[:-MEMORY_ROWS] = rot.IDENTITY
+        self._adapted: dict[float, Array] = {}
 
     def solve(self, points: ArrayLike, previous: Solution | None = None, dt: float = 1 / 60) -> Solution:
         """Pose the figure for one frame.
@@ -88,17 +95,16 @@ class SequentialIK:
             dt: Time since that frame [s].
         """
         frame = as_points(points)
-        local, memory = self._start() if previous is None else (s.copy() for s in previous.state)
-        joints = len(self.figure.skeleton)
-        rotations, pelvis = np.empty((1, joints, 4)), np.empty((1, 3))
+        state = (self._start if previous is None else previous.state[0]).copy()
+        rotations, pelvis = np.empty((1, len(self.figure.skeleton), 4)), np.empty((1, 3))
         status, residual = np.empty(1, np.int64), np.empty((1, 6))
         solve_frames(
-            self._model, self._settings(dt), frame[None], local, memory, make_scratch(self._model),
+            *self._arrays, self._settings(dt), frame[None], state, np.empty(self._work),
             rotations, pelvis, status, residual,
         )
         moving, translations = self._place(pelvis)
         pose = Pose(self.figure.skeleton, rotations[0], translations[0], moving)
-        return Solution(pose, Status(status[0]), residual[0], 1, (local, memory))
+        return Solution(pose, STATUSES[status[0]], residual[0], 1, (state,))
 
     def solve_frames(self, targets: Targets, progress: Progress | None = None) -> MotionSolution:
         """Pose the figure for every frame.
@@ -110,14 +116,14 @@ class SequentialIK:
         frames, joints = len(targets), len(self.figure.skeleton)
         rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
         status, residual = np.empty(frames, np.int64), np.empty((frames, 6))
-        local, memory = self._start()
-        settings, scratch = self._settings(1.0 / targets.rate), make_scratch(self._model)
+        state, work = self._start.copy(), np.empty(self._work)
         points = targets.positions.copy()  # read-only arrays are another type to Numba: one more compilation
+        options = self._settings(1.0 / targets.rate)
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             solve_frames(
-                self._model, settings, points[part], local, memory, scratch,
+                *self._arrays, options, points[part], state, work,
                 rotations[part], pelvis[part], status[part], residual[part],
             )
             if progress:
@@ -143,11 +149,15 @@ class SequentialIK:
         points[1] += self.figure.head_offset
         self.solve(points)
 
-    def _settings(self, dt: float) -> Settings:
-        return Settings(*weights_at_rate(self.weights, dt), **self._options)
-
-    def _start(self) -> tuple[Array, Array]:
-        return np.tile(rot.IDENTITY, (self._model.rows, 1)), np.zeros((MEMORY_ROWS, 3))
+    def _settings(self, dt: float) -> Array:
+        """Options for a frame time as seven numbers; the last ones asked for are kept."""
+        known = self._adapted.get(dt)
+        if known is None:
+            settings = Settings(*weights_at_rate(self.weights, dt), **self._options)
+            if len(self._adapted) > 100:
+                self._adapted.clear()
+            known = self._adapted[dt] = np.array(settings, float)
+        return known
 
     def _place(self, pelvis: Array) -> tuple[tuple[int, ...], Array]:
         """Which joints translate and where to; a root above the pelvis stands still."""

@@ -3,8 +3,8 @@
 All trunk segments turn about one world axis v by shares of the pelvis' angle phi (eq. 1), so the chord
 pelvis-head is a sum of plane rotations: the search for the chord length costs a few multiplications a step.
 
-Scratch arrays: ``world`` (S, 4) are the world rotations of the trunk joints, ``segs`` (S, 3) the segment
-vectors in the world; both are updated in place. ``local`` rows 1 to S - 1 are the interior joints.
+Scratch arrays: ``world`` (S, 4) are the world rotations of the trunk joints, ``segs`` (S, 4) the segment
+vectors in the world (columns 0 to 2); both are updated in place. ``local`` rows 1 to S - 1 are the interior joints.
 """
 
 from math import cos, sin, sqrt
@@ -94,11 +94,11 @@ def plane_components(segs, v, flat):
 
 
 @helper
-def flat_chord(bend, flat, phi):
+def flat_chord(segments, flat, phi):
     """Chord across v after turning by phi: length squared and half its derivative."""
     x, y, dx, dy = 0.0, 0.0, 0.0, 0.0
     for k in range(flat.shape[0]):
-        share = bend[k, 0]
+        share = segments[k, 3]
         c, s = cos(share * phi), sin(share * phi)
         px = c * flat[k, 0] - s * flat[k, 1]
         py = s * flat[k, 0] + c * flat[k, 1]
@@ -110,7 +110,7 @@ def flat_chord(bend, flat, phi):
 
 
 @helper
-def search_angle(bend, flat, along, wanted, literal):
+def search_angle(segments, flat, along, wanted, literal):
     """Angle phi of the pelvis for which the chord has the wanted length (Algorithm 3).
 
     Coarse steps of 0.1 rad until the length is passed, then either fine steps of 0.01 rad back
@@ -119,7 +119,7 @@ def search_angle(bend, flat, along, wanted, literal):
     Returns:
         phi [rad] and whether the length was met; if not, phi is the best found.
     """
-    squared = flat_chord(bend, flat, 0.0)[0]
+    squared = flat_chord(segments, flat, 0.0)[0]
     goal = wanted * wanted - along * along
     sign = 1.0 if squared > goal else -1.0
     length = sqrt(squared + along * along)
@@ -130,7 +130,7 @@ def search_angle(bend, flat, along, wanted, literal):
     while not passed and steps < COARSE_CAP:
         phi += step * COARSE
         steps += 1
-        squared = flat_chord(bend, flat, phi)[0]
+        squared = flat_chord(segments, flat, phi)[0]
         before, length = length, sqrt(squared + along * along)
         passed = sign * squared <= sign * goal
         gap = abs(length - wanted)
@@ -152,20 +152,20 @@ def search_angle(bend, flat, along, wanted, literal):
     if literal:
         for _ in range(FINE_CAP):
             phi -= step * FINE
-            if sign * flat_chord(bend, flat, phi)[0] >= sign * goal:
+            if sign * flat_chord(segments, flat, phi)[0] >= sign * goal:
                 break
         return phi, True
-    return _refine(bend, flat, goal, phi - step * COARSE, phi, along), True
+    return _refine(segments, flat, goal, phi - step * COARSE, phi, along), True
 
 
 @helper
-def _refine(bend, flat, goal, inside, outside, along):
+def _refine(segments, flat, goal, inside, outside, along):
     """Newton's method kept inside the bracket; f = chord squared minus goal."""
-    f_inside = flat_chord(bend, flat, inside)[0] - goal
+    f_inside = flat_chord(segments, flat, inside)[0] - goal
     phi = outside
     tolerance = 2.0 * sqrt(max(goal + along * along, 1e-12)) * EXACT
     for _ in range(40):
-        squared, slope = flat_chord(bend, flat, phi)
+        squared, slope = flat_chord(segments, flat, phi)
         f = squared - goal
         if abs(f) < tolerance:
             break
@@ -179,10 +179,10 @@ def _refine(bend, flat, goal, inside, outside, along):
 
 
 @helper
-def turn_trunk(bend, v, phi, world, segs):
+def turn_trunk(segments, v, phi, world, segs):
     """Turn every segment by its share of phi about v."""
     for k in range(world.shape[0]):
-        q = qt.from_axis_angle(v, bend[k, 0] * phi)
+        q = qt.from_axis_angle(v, segments[k, 3] * phi)
         qt.store(world, k, qt.mul(q, qt.load(world, k)))
         vec.store(segs, k, qt.mul_vec(q, vec.load(segs, k)))
 
@@ -200,12 +200,12 @@ def clamp_interior(balls, count, local):
 
 
 @helper
-def _clamped_chord(segments, bend, balls, v, phi, start, world, segs, local):
+def _clamped_chord(segments, balls, v, phi, start, world, segs, local):
     """Chord length after turning the trunk from ``start`` (local rotations) by phi within the limits."""
     for k in range(world.shape[0]):
         qt.store(local, k, qt.load(start, k))
     place_trunk(segments, local, world, segs)
-    turn_trunk(bend, v, phi, world, segs)
+    turn_trunk(segments, v, phi, world, segs)
     read_trunk(world, local)
     clamp_interior(balls, world.shape[0], local)
     place_trunk(segments, local, world, segs)
@@ -213,19 +213,19 @@ def _clamped_chord(segments, bend, balls, v, phi, start, world, segs, local):
 
 
 @helper
-def search_within_limits(segments, bend, balls, v, wanted, start, world, segs, local):
+def search_within_limits(segments, balls, v, wanted, start, world, segs, local):
     """Algorithm 3 with the limits inside the loop: coarse steps, then bisection of the last one.
 
     ``start`` holds the local rotations to bend from. Leaves the trunk at the best angle found.
     """
-    length = _clamped_chord(segments, bend, balls, v, 0.0, start, world, segs, local)
+    length = _clamped_chord(segments, balls, v, 0.0, start, world, segs, local)
     sign = 1.0 if length > wanted else -1.0
     step, phi, best_phi, best_gap = -sign * COARSE, 0.0, 0.0, abs(length - wanted)
     passed, flipped = False, False
     steps = 0
     while steps < COARSE_CAP:
         before = length
-        length = _clamped_chord(segments, bend, balls, v, phi + step, start, world, segs, local)
+        length = _clamped_chord(segments, balls, v, phi + step, start, world, segs, local)
         steps += 1
         if sign * length <= sign * wanted:
             passed = True
@@ -243,13 +243,13 @@ def search_within_limits(segments, bend, balls, v, wanted, start, world, segs, l
         low, high = phi, phi + step
         for _ in range(24):
             middle = 0.5 * (low + high)
-            length = _clamped_chord(segments, bend, balls, v, middle, start, world, segs, local)
+            length = _clamped_chord(segments, balls, v, middle, start, world, segs, local)
             if sign * length > sign * wanted:
                 low = middle
             else:
                 high = middle
         best_phi = high
-    return abs(_clamped_chord(segments, bend, balls, v, best_phi, start, world, segs, local) - wanted) < 1e-4
+    return abs(_clamped_chord(segments, balls, v, best_phi, start, world, segs, local) - wanted) < 1e-4
 
 
 @helper
@@ -293,7 +293,7 @@ def stretch(turns, chords, wanted, local):
 
 @helper
 def set_chord(
-    segments, bend, turns, chords, balls, limits, literal, wanted, goal, local, world, segs, start, flat, plane
+    segments, turns, chords, balls, limits, literal, wanted, goal, local, world, segs, start, flat, plane
 ):
     """Give the trunk the wanted chord length (Algorithm 2, lines 4 to 13).
 
@@ -321,11 +321,11 @@ def set_chord(
     chord = chord_of(segs)
     v = bending_axis(chord, goal, local, world, plane)
     along = plane_components(segs, v, flat)
-    phi, met = search_angle(bend, flat, along, wanted, literal)
-    turn_trunk(bend, v, phi, world, segs)
+    phi, met = search_angle(segments, flat, along, wanted, literal)
+    turn_trunk(segments, v, phi, world, segs)
     read_trunk(world, local)
     if limits and clamp_interior(balls, count, local):
-        met = search_within_limits(segments, bend, balls, v, wanted, start, world, segs, local)
+        met = search_within_limits(segments, balls, v, wanted, start, world, segs, local)
     if not met and vec.norm(chord) < wanted:
         unbend(segments, wanted, start, world, segs, local)
     return v
