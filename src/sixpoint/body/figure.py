@@ -12,7 +12,6 @@ rig's rest rotation; ``Figure.compute_motion(..., extras=recording)`` copies the
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,16 +24,18 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.anthropometry import build_skeleton, segments_of_stature
 from sixpoint.body.dofs import Ball, Dofs, JointDof
 from sixpoint.body.limits import Limits
+from sixpoint.body.mapping import read_mapping
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.neutral import compute_neutral
 from sixpoint.body.roles import Roles, find_roles
 from sixpoint.body.skeleton import Skeleton, frozen
+from sixpoint.body.spine_chain import COINCIDENT, SpineChain
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FigureError, FormatError
+from sixpoint.errors import FigureError
 
 Array = NDArray[np.float64]
 
-COINCIDENT = 1e-3  # joints nearer than this [m] are at the same place
+__all__ = ["COINCIDENT", "Figure", "SpineChain"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class Figure:
         Raises:
             FigureError: A role was not found, or a limb has no length.
         """
-        roles = find_roles(motion.skeleton, _read_mapping(mapping))
+        roles = find_roles(motion.skeleton, read_mapping(mapping), motion)
         neutral = compute_neutral(motion.skeleton, roles, motion)
         return cls._with_limits(motion.skeleton, roles, neutral, limits, motion.name)
 
@@ -89,7 +90,7 @@ class Figure:
         limits: Limits | None = None,
     ) -> Figure:
         """Find the anatomy of a rig from its rest pose alone; see ``from_motion``."""
-        roles = find_roles(skeleton, _read_mapping(mapping))
+        roles = find_roles(skeleton, read_mapping(mapping))
         return cls._with_limits(skeleton, roles, compute_neutral(skeleton, roles), limits, "figure")
 
     @classmethod
@@ -264,57 +265,4 @@ class Figure:
     def extremities(self) -> list[int]:
         """Joints strictly below wrists, ankles and head: fingers, toes, face."""
         ends = (*self.roles.wrist, *self.roles.ankle, self.roles.head)
-        return [j for j in range(len(self.skeleton)) if any(j != e and self.skeleton.path(e, j) for e in ends)]
-
-
-@dataclass(frozen=True, eq=False)
-class SpineChain:
-    """The trunk's rotating joints and the segments they carry; joints at the same place are merged.
-
-    Attributes:
-        joints: S joints that rotate, the pelvis first; joint k carries segment k.
-        segments: (S, 3) segment vectors in the neutral pose [m]; their sum is the chord pelvis -> head.
-        node: Trunk joint -> index of the chain node at its place (S is the head's).
-    """
-
-    joints: tuple[int, ...]
-    segments: Array
-    node: Mapping[int, int]
-
-    @classmethod
-    def from_figure(cls, figure: Figure) -> SpineChain:
-        """Merge coincident joints: of joints at one place the first rotates, the others follow."""
-        trunk = (figure.roles.pelvis, *figure.roles.spine)
-        places = [figure.rest_positions[j] for j in trunk]
-        node = {trunk[0]: 0}
-        joints, points = [trunk[0]], [places[0]]
-        for joint, place in zip(trunk[1:], places[1:], strict=True):
-            if np.linalg.norm(place - points[-1]) > COINCIDENT:
-                joints.append(joint)
-                points.append(place)
-            node[joint] = len(points) - 1
-        if np.linalg.norm(figure.head_offset) > COINCIDENT:
-            points.append(places[-1] + figure.head_offset)
-        else:
-            joints = joints[: len(points) - 1]  # the head joint carries nothing: it follows its neck
-        if len(points) < 2:
-            raise FigureError("pelvis and head are at the same place: the trunk has no length")
-        return cls(tuple(joints), frozen(np.diff(points, axis=0)), node)  # type: ignore[arg-type]
-
-
-def _read_mapping(mapping: Mapping[str, str] | str | Path | None) -> dict[str, str]:
-    if mapping is None:
-        return {}
-    if isinstance(mapping, Mapping):
-        return dict(mapping)
-    try:
-        table = tomllib.loads(Path(mapping).read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FormatError(mapping, f"not a TOML file: {error}") from error
-    except OSError as error:
-        raise FormatError(mapping, f"cannot be read: {error.strerror}") from error
-    table = table.get("roles", table)
-    wrong = [key for key, value in table.items() if not isinstance(value, str)]
-    if wrong:
-        raise FormatError(mapping, f"each role names one joint; not so at {', '.join(wrong)}")
-    return table
+        return sorted({int(j) for end in ends for j in self.skeleton.subtree(end)[1:]})

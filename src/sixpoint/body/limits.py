@@ -120,7 +120,8 @@ class Limits:
         names = [row[0] for row in self.table["spine"]["levels"]]
         known = [(height, names.index(name)) for name, height in self.table["spine"]["places"]]
         place = np.interp(heights, *np.transpose(known))
-        nearest = [int(np.argmin(np.abs(place - k) + 1e-9 * np.arange(len(place)))) for k in range(len(levels))]
+        tie = 1e-9 * np.arange(len(place))
+        nearest = [int(np.argmin(np.abs(place - level) + tie)) for level in range(len(levels))]
         balls = []
         for joint in range(len(place)):
             flexion, extension, lateral, axial = np.minimum(

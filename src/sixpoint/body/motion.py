@@ -96,7 +96,7 @@ class Motion:
                 f"rotations must be (frames, {joints}, 4) for this skeleton, got {self.rotations.shape}"
             )
         if self.moving[:1] != (0,) or len(set(self.moving)) != len(self.moving):
-            raise SkeletonError(f"moving joints must be distinct and start with the root 0, got {self.moving}")
+            raise SkeletonError(f"moving joints must be distinct, the root 0 first, got {self.moving}")
         if self.translations.shape != (frames, len(self.moving), 3):
             raise SkeletonError(
                 f"translations must be ({frames}, {len(self.moving)}, 3), got {self.translations.shape}"
@@ -138,7 +138,7 @@ class Motion:
     def sliced(self, frames: slice) -> Motion:
         """The frames of a slice; an empty slice is an error that says how many frames there are."""
         if len(range(*frames.indices(len(self)))) == 0:
-            raise SkeletonError(f"no frames left: {len(self)} frames (0 to {len(self) - 1}), asked for {frames}")
+            raise SkeletonError(f"no frames left of 0 to {len(self) - 1}, asked for {frames}")
         step = abs(frames.step or 1)
         return replace(
             self,

@@ -6,24 +6,20 @@ there to the head, and the clavicle is what lies between the spine and a shoulde
 
 from __future__ import annotations
 
-import re
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.motion import Motion
+from sixpoint.body.rig_names import SIDES, find_named, is_chain
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.structure import find_limbs
 from sixpoint.errors import FigureError, listed
 
 Array = NDArray[np.float64]
 
-SIDES = ("l", "r")
 LIMB_ROLES = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 MAPPING_ROLES = (
     "pelvis",
@@ -31,6 +27,7 @@ MAPPING_ROLES = (
     *(f"{side}_{role}" for role in ("clavicle", *LIMB_ROLES) for side in SIDES),
 )
 """Roles that a mapping may name."""
+LIMB_JOINTS = tuple(f"{side}_{role}" for role in LIMB_ROLES for side in SIDES)
 
 
 @dataclass(frozen=True)
@@ -86,33 +83,43 @@ class Roles:
         return out
 
 
-def find_roles(skeleton: Skeleton, mapping: Mapping[str, str] | None = None) -> Roles:
+def find_roles(
+    skeleton: Skeleton, mapping: Mapping[str, str] | None = None, motion: Motion | None = None
+) -> Roles:
     """Find the anatomical roles of a rig.
 
     Args:
         skeleton: Any rig.
         mapping: Role -> joint name, for the roles that should not be searched (``MAPPING_ROLES``).
+        motion: A recording on the rig. It tells left from right where neither names nor rest pose do.
 
     Raises:
         FigureError: A role was not found; the message lists the joints and the missing roles.
     """
     given = _checked(skeleton, mapping or {})
-    found = _from_names(skeleton)
+    found = find_named(skeleton)
     by = "names"
-    if not all(f"{s}_{r}" in found | given for r in LIMB_ROLES for s in SIDES):
-        structural = find_limbs(skeleton)
+    if not all(role in found | given for role in LIMB_JOINTS):
+        structural = find_limbs(skeleton, None if motion is None else motion.rotations)
         if structural:
-            found, by = structural | {k: v for k, v in found.items() if k == "head"}, "structure"
+            found, by = _joined(structural, found), "structure"
     if given:
         by = f"{by} and mapping"
     found |= given
-    missing = [f"{s}_{r}" for r in LIMB_ROLES for s in SIDES if f"{s}_{r}" not in found]
+    missing = [role for role in LIMB_JOINTS if role not in found]
     if missing:
         raise FigureError(
             f"these roles were not found: {listed(missing)}. Joints of the rig: {listed(skeleton.names)}. "
-            "Name them in a mapping file, e.g. l_hip = \"LeftThigh\""
+            'Name them in a mapping file, e.g. l_hip = "LeftThigh"'
         )
     return _assemble(skeleton, found, by)
+
+
+def _joined(structural: Mapping[str, int], named: Mapping[str, int]) -> dict[str, int]:
+    """What names told goes first; where they contradict the sides of the structure, these are swapped."""
+    mirrored = {f"{'lr'[role[0] == 'l']}{role[1:]}": joint for role, joint in structural.items()}
+    votes = [(structural[r] == j) - (mirrored[r] == j) for r, j in named.items() if r in structural]
+    return {**(structural if sum(votes) >= 0 else mirrored), **named}
 
 
 def _checked(skeleton: Skeleton, mapping: Mapping[str, str]) -> dict[str, int]:
@@ -127,102 +134,12 @@ def _checked(skeleton: Skeleton, mapping: Mapping[str, str]) -> dict[str, int]:
     return {role: skeleton.index(name) for role, name in mapping.items()}
 
 
-# --- names ---------------------------------------------------------------------------------------
-
-
-@cache
-def _tables() -> dict[str, Any]:
-    text = resources.files("sixpoint.body").joinpath("data/rig_names.toml").read_text("utf-8")
-    return tomllib.loads(text)
-
-
-@cache
-def _vocabulary() -> frozenset[str]:
-    tables = _tables()
-    words = {w for row in tables["legs"] + tables["arms"] for words in row.values() for w in words}
-    return frozenset(words | set(tables["clavicle"]))
-
-
-def split_name(name: str) -> tuple[str, str]:
-    """Joint name -> (side "l", "r" or "", base in lower case): ``"LeftUpLeg"`` -> ``("l", "upleg")``."""
-    name = name.rsplit(":", 1)[-1].rsplit("|", 1)[-1]
-    tokens = [t.lower() for t in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
-    for k, token in enumerate(tokens):
-        if token in ("left", "l", "right", "r"):
-            return token[0], "".join(tokens[:k] + tokens[k + 1 :])
-    base = "".join(tokens)
-    for side, word in (("l", "left"), ("r", "right")):
-        if base.startswith(word):
-            return side, base[len(word) :]
-    if base[:1] in SIDES and base[1:] in _vocabulary():
-        return base[0], base[1:]
-    return "", base
-
-
-def _from_names(skeleton: Skeleton) -> dict[str, int]:
-    """Roles found by name: whole legs, whole arms, clavicles and head."""
-    named: dict[tuple[str, str], int] = {}
-    for joint, name in enumerate(skeleton.names):
-        named.setdefault(split_name(name), joint)
-    tables = _tables()
-    found: dict[str, int] = {}
-    prefix = ""
-    for rows in (tables["legs"], tables["arms"]):
-        for row in rows:
-            match, match_prefix = _match_row(skeleton, named, row)
-            if match:
-                found, prefix = found | match, match_prefix
-                break
-    for side in SIDES:
-        for word in tables["clavicle"]:
-            joint = named.get((side, prefix + word))
-            if joint is not None and joint != found.get(f"{side}_shoulder"):
-                found[f"{side}_clavicle"] = joint
-                break
-    for word in tables["head"]:
-        joint = named.get(("", prefix + word), named.get(("", word)))
-        if joint is not None:
-            found["head"] = joint
-            break
-    return found
-
-
-def _match_row(
-    skeleton: Skeleton, named: Mapping[tuple[str, str], int], row: Mapping[str, list[str]]
-) -> tuple[dict[str, int], str]:
-    """Match one naming family on both sides under one common prefix."""
-    bases = {base for side, base in named if side}
-    first = next(iter(row.values()))
-    prefixes = {base[: -len(word)] for base in bases for word in first if base.endswith(word)}
-    for prefix in sorted(prefixes, key=len):
-        found: dict[str, int] = {}
-        for side in SIDES:
-            for role, words in row.items():
-                joints = [named[(side, prefix + w)] for w in words if (side, prefix + w) in named]
-                if joints:
-                    found[f"{side}_{role}"] = joints[0]
-        complete = len(found) == 2 * len(row)
-        if complete and all(_is_chain(skeleton, [found[f"{s}_{r}"] for r in row]) for s in SIDES):
-            return found, prefix
-    return {}, ""
-
-
-def _is_chain(skeleton: Skeleton, joints: Iterable[int]) -> bool:
-    joints = list(joints)
-    return all(
-        a != b and bool(skeleton.path(a, b)) for a, b in zip(joints[:-1], joints[1:], strict=True)
-    )
-
-
-# --- from limbs to the whole ---------------------------------------------------------------------
-
-
 def _assemble(skeleton: Skeleton, found: Mapping[str, int], by: str) -> Roles:
     pairs = {r: (found[f"l_{r}"], found[f"r_{r}"]) for r in LIMB_ROLES}
     for chain in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
         for k, side in enumerate(SIDES):
             joints = [pairs[r][k] for r in chain]
-            if not _is_chain(skeleton, joints):
+            if not is_chain(skeleton, joints):
                 names = " > ".join(skeleton.names[j] for j in joints)
                 raise FigureError(f"{side}_{', '.join(chain)} are not one below the other: {names}")
     upper = skeleton.common_ancestor(pairs["shoulder"])
@@ -265,23 +182,26 @@ def _find_head(
     zero = (0.0, 0.0, 0.0)
     if "head" in found:
         return found["head"], zero
-    arms = {c for c in skeleton.children[upper] for s in pairs["shoulder"] if skeleton.path(c, s)}
-    neck = [c for c in skeleton.children[upper] if c not in arms]
-    if not neck:
+    necks = [c for c in skeleton.children[upper] if not any(skeleton.path(c, s) for s in pairs["shoulder"])]
+    joint = max(necks, key=lambda c: _reach(skeleton, c), default=upper)
+    while joint != upper and skeleton.children[joint]:
+        *others, ahead = sorted(skeleton.children[joint], key=lambda c: _reach(skeleton, c))
+        if others and _reach(skeleton, others[-1]) > 0.4 * _reach(skeleton, ahead):
+            break  # eyes, jaw and hair branch off: this is the head
+        joint = ahead
+    sites = skeleton.sites_of(joint)
+    lengths = np.linalg.norm(skeleton.site_offsets[sites], axis=1)
+    if lengths.max(initial=0.0) > 1e-6:
+        x, y, z = (float(v) for v in skeleton.site_offsets[sites[np.argmax(lengths)]])
+        return joint, (x, y, z)
+    if joint == upper:
         raise FigureError(
             "this role was not found: head (no joint is named so, and nothing rises between the arms). "
-            f"Joints of the rig: {listed(skeleton.names)}. Name it in a mapping file: head = \"...\""
+            f'Joints of the rig: {listed(skeleton.names)}. Name it in a mapping file: head = "..."'
         )
-    joint = max(neck, key=lambda c: _reach(skeleton, c))
-    while skeleton.children[joint]:
-        joint = max(skeleton.children[joint], key=lambda c: _reach(skeleton, c))
-    sites = [s for s in skeleton.sites_of(joint) if np.linalg.norm(skeleton.site_offsets[s]) > 1e-6]
-    if not sites:
-        return joint, zero
-    x, y, z = (float(v) for v in skeleton.site_offsets[sites[0]])
-    return joint, (x, y, z)
+    return joint, zero
 
 
 def _reach(skeleton: Skeleton, joint: int) -> float:
-    below = [_reach(skeleton, c) for c in skeleton.children[joint]]
-    return float(np.linalg.norm(skeleton.offsets[joint])) + max(below, default=0.0)
+    """Longest way from the parent of ``joint`` down through it."""
+    return float(np.linalg.norm(skeleton.offsets[joint]) + skeleton.ways_down[0][joint])

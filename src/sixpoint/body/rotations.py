@@ -47,7 +47,7 @@ def normalised(q: ArrayLike) -> Array:
 def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
     """Rotation by ``angle`` [rad] (...,) about unit ``axis`` (..., 3)."""
     half = np.asarray(angle, float)[..., None] / 2.0
-    axis = np.broadcast_to(np.asarray(axis, float), half.shape[:-1] + (3,))
+    axis = np.broadcast_to(np.asarray(axis, float), (*half.shape[:-1], 3))
     return np.concatenate([axis * np.sin(half), np.cos(half)], axis=-1)
 
 
@@ -68,21 +68,21 @@ def from_axes(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
     """Rotation whose matrix has the orthonormal columns ``x``, ``y``, ``z`` (..., 3)."""
     matrix = np.stack([np.asarray(x, float), np.asarray(y, float), np.asarray(z, float)], axis=-1)
     quat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat()
-    return np.asarray(quat.reshape(matrix.shape[:-2] + (4,)), float)
+    return np.asarray(quat.reshape((*matrix.shape[:-2], 4)), float)
 
 
 def from_euler(order: str, angles: ArrayLike) -> Array:
-    """Intrinsic Euler angles [rad] (..., 3), e.g. ``order="ZXY"`` as BVH lists them, to quaternions (..., 4)."""
+    """Intrinsic Euler angles [rad] (..., 3), e.g. ``order="ZXY"`` as in BVH, to quaternions (..., 4)."""
     angles = np.asarray(angles, float)
     quat = Rotation.from_euler(order.upper(), angles.reshape(-1, len(order))).as_quat()
-    return np.asarray(quat.reshape(angles.shape[:-1] + (4,)), float)
+    return np.asarray(quat.reshape((*angles.shape[:-1], 4)), float)
 
 
 def to_euler(order: str, q: ArrayLike) -> Array:
-    """Quaternions (..., 4) to intrinsic Euler angles [rad] (..., 3); at gimbal lock the last angle is zero."""
+    """Quaternions (..., 4) to intrinsic Euler angles [rad] (..., 3); at gimbal lock the last is zero."""
     q = np.asarray(q, float)
     angles = Rotation.from_quat(q.reshape(-1, 4)).as_euler(order.upper(), suppress_warnings=True)
-    return np.asarray(angles.reshape(q.shape[:-1] + (3,)), float)
+    return np.asarray(angles.reshape((*q.shape[:-1], 3)), float)
 
 
 def angle(q: ArrayLike) -> Array:

@@ -6,6 +6,7 @@ Sites are points fixed to a joint that carry no rotation: end sites, tool and ma
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -62,7 +63,7 @@ class Skeleton:
         count = len(self.names)
         if count == 0:
             raise SkeletonError("a skeleton needs at least one joint")
-        duplicates = sorted({n for n in self.names if self.names.count(n) > 1})
+        duplicates = sorted(name for name, times in Counter(self.names).items() if times > 1)
         if duplicates:
             raise SkeletonError(f"joint names must be distinct; repeated: {listed(duplicates)}")
         if self.parents.shape != (count,) or self.offsets.shape != (count, 3):
@@ -115,6 +116,46 @@ class Skeleton:
                 return []
             chain.append(parent)
         return chain[::-1]
+
+    def subtree(self, joint: int) -> Index:
+        """Indices of ``joint`` and all joints below it, in joint order."""
+        inside = np.zeros(len(self), bool)
+        inside[joint] = True
+        for below in range(joint + 1, len(self)):
+            inside[below] = inside[self.parents[below]]
+        return np.flatnonzero(inside)
+
+    @cached_property
+    def ways_down(self) -> tuple[Array, tuple[tuple[str, int] | None, ...]]:
+        """Per joint: length of the longest way down [units of the offsets], and what it leads to next.
+
+        That is ``("joint", child)``, ``("site", site)`` or None at a tip.
+        """
+        way = np.zeros(len(self))
+        ahead: list[tuple[str, int] | None] = [None] * len(self)
+        for site, joint in enumerate(self.site_parents):
+            length = float(np.linalg.norm(self.site_offsets[site]))
+            if length > way[joint]:
+                way[joint], ahead[joint] = length, ("site", site)
+        lengths = np.linalg.norm(self.offsets, axis=1)
+        for joint in range(len(self) - 1, 0, -1):  # children come after their parents
+            parent = self.parents[joint]
+            length = float(way[joint] + lengths[joint])
+            if length > way[parent] or ahead[parent] is None:
+                way[parent], ahead[parent] = length, ("joint", joint)
+        return way, tuple(ahead)
+
+    def longest_chain(self, joint: int) -> list[tuple[int, Array]]:
+        """Joints of the longest way down, each with its bone (3,): offset to the next point, 0 at a tip."""
+        chain: list[tuple[int, Array]] = []
+        while True:
+            kind, k = self.ways_down[1][joint] or ("tip", joint)
+            if kind == "joint":
+                chain.append((joint, self.offsets[k]))
+                joint = k
+                continue
+            chain.append((joint, self.site_offsets[k] if kind == "site" else np.zeros(3)))
+            return chain
 
     def common_ancestor(self, joints: Sequence[int]) -> int:
         """The deepest joint that is an ancestor of (or equal to) all of ``joints``."""

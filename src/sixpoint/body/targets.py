@@ -55,12 +55,12 @@ class Targets:
     @property
     def tracked(self) -> NDArray[np.bool_]:
         """(F, 6) whether each point is known."""
-        return np.all(np.isfinite(self.positions), axis=-1)
+        return np.asarray(np.all(np.isfinite(self.positions), axis=-1), bool)
 
     def sliced(self, frames: slice) -> Targets:
         """The frames of a slice; an empty slice is an error that says how many frames there are."""
         if len(range(*frames.indices(len(self)))) == 0:
-            raise TargetError(f"no frames left: {len(self)} frames (0 to {len(self) - 1}), asked for {frames}")
+            raise TargetError(f"no frames left of 0 to {len(self) - 1}, asked for {frames}")
         rotations = None if self.rotations is None else self.rotations[frames]
         step = abs(frames.step or 1)
         return replace(self, positions=self.positions[frames], rotations=rotations, rate=self.rate / step)
