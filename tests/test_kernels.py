@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from independent import limit_excess
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from sixpoint import Limits
@@ -120,10 +121,15 @@ def test_an_arm_overhead_and_behind_stays_up():
 
 @pytest.mark.parametrize("b", range(len(BALLS)))
 def test_swing_limit_is_the_spline(b):
-    """The compiled cubic is SciPy's spline at every direction."""
+    """The compiled cubic is SciPy's spline with the end slopes of eq. 3, clipped to its knots."""
+    limit = BALLS[b].limit
+    slopes = np.diff(limit.psi) / np.diff(limit.theta)
+    end = (1, 0.5 * (slopes[0] + slopes[-1]))
+    spline = CubicSpline(limit.theta, limit.psi, bc_type=(end, end))
     theta = np.linspace(-pi, pi, 721)
-    ours = [swing_limit(ROWS[b], t) for t in theta]
-    np.testing.assert_allclose(ours, BALLS[b].limit.compute_limit(theta), atol=1e-12)
+    expected = np.clip(spline(theta), limit.psi.min(), limit.psi.max())
+    np.testing.assert_allclose([swing_limit(ROWS[b], t) for t in theta], expected, atol=1e-12)
+    np.testing.assert_allclose(limit.compute_limit(theta), expected, atol=1e-12)
 
 
 def test_cache_folder_changes_with_the_sources(tmp_path, monkeypatch):

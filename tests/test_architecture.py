@@ -1,0 +1,84 @@
+"""Who may import whom: the folder tree is the architecture."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "src" / "sixpoint"
+
+ALLOWED = {
+    "errors": set(),
+    "kernels": {"kernels"},
+    "body": {"body", "errors"},
+    "samples": {"samples", "body", "errors"},
+    "formats": {"formats", "body", "errors"},
+    "solvers": {"solvers", "kernels", "body", "errors"},
+    "study": {"study", "body", "errors"},
+    "jobs": {"jobs", "solvers", "formats", "samples", "study", "body", "errors"},
+    "cli": {"cli", "jobs", "solvers", "body", "errors"},
+    "__main__": {"cli"},
+}
+"""Room -> rooms it may import."""
+
+LIBRARIES = {
+    "kernels": {"numpy", "numba"},
+    "body": {"numpy", "scipy"},
+    "formats": {"numpy", "scipy"},
+    "samples": {"numpy", "scipy"},
+    "solvers": {"numpy"},
+    "study": {"numpy", "scipy", "matplotlib"},
+    "jobs": {"numpy"},
+    "cli": {"numpy", "cyclopts", "rich"},
+}
+"""Room -> third-party libraries it may import."""
+
+FILES = sorted(p for p in PACKAGE.rglob("*.py") if p != PACKAGE / "__init__.py")
+
+
+def imports(path: Path) -> set[str]:
+    """Full names of everything a file imports."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def room_of(path: Path) -> str:
+    part = path.relative_to(PACKAGE).parts[0]
+    return part.removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_rooms_import_only_what_lies_below(path):
+    """Every import points down the architecture, and to the libraries of its room."""
+    room = room_of(path)
+    assert room in ALLOWED, f"a new room {room}: say in ALLOWED what it may import"
+    for name in imports(path):
+        parts = name.split(".")
+        if parts[0] == "sixpoint":
+            below = parts[1] if len(parts) > 1 else ""
+            assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
+        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich"}:
+            assert parts[0] in LIBRARIES.get(room, set()), name
+
+
+def test_every_public_name_has_one_place_and_a_docstring():
+    """``__all__`` is sorted, complete, and everything in it says what it is."""
+    import sixpoint as sp
+
+    for name in sp.__all__:
+        value = getattr(sp, name)
+        assert isinstance(value, (dict, tuple)) or (value.__doc__ and len(value.__doc__) > 15), name
+
+
+def test_files_stay_small():
+    """No source file grows beyond 350 lines."""
+    long = {str(p.relative_to(PACKAGE)): n for p in FILES if (n := len(p.read_text("utf-8").splitlines())) > 350}
+    assert not long
