@@ -18,7 +18,7 @@ ALLOWED = {
     "solvers": {"solvers", "kernels", "body", "errors"},
     "study": {"study", "body", "errors"},
     "jobs": {"jobs", "solvers", "formats", "samples", "study", "body", "errors"},
-    "cli": {"cli", "jobs", "solvers", "body", "errors"},
+    "cli": {"cli", "jobs", "study", "solvers", "body", "errors"},
     "__main__": {"cli"},
 }
 """Room -> rooms it may import."""

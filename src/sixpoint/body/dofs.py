@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from sixpoint.body import rotations as rot
@@ -53,7 +52,7 @@ class SwingTwist:
         theta, psi = self.theta, self.psi
         if len(theta) < 3 or len(theta) != len(psi) or np.any(np.diff(theta) <= 0):
             raise FigureError("a swing limit needs at least three knots with increasing theta")
-        if not (np.isclose(theta[0], -np.pi) and np.isclose(theta[-1], np.pi) and np.isclose(psi[0], psi[-1])):
+        if not np.allclose([theta[0], theta[-1], psi[0]], [-np.pi, np.pi, psi[-1]]):
             raise FigureError("swing knots must run from -180 to 180 degrees and end as they begin")
         if np.any(psi < 0) or np.any(psi > np.pi):
             raise FigureError("swing limits must lie between 0 and 180 degrees")
@@ -61,15 +60,31 @@ class SwingTwist:
             raise FigureError("the twist range must contain the neutral pose (0 degrees)")
 
     @cached_property
-    def spline(self) -> CubicSpline:
-        """psi_max(theta) before clipping to the range of the knots."""
-        t, p = self.theta, self.psi
-        slope = 0.5 * ((p[1] - p[0]) / (t[1] - t[0]) + (p[-1] - p[-2]) / (t[-1] - t[-2]))  # eq. 3
-        return CubicSpline(t, p, bc_type=((1, slope), (1, slope)))
+    def cubics(self) -> Array:
+        """(K - 1, 4) coefficients of each piece in theta minus its knot, highest power first.
+
+        A cubic spline with the same slope at both ends (eq. 3), before clipping to the knots.
+        """
+        step, rise = np.diff(self.theta), np.diff(self.psi)
+        slope = rise / step
+        # Slopes m at the knots: given at the ends, continuous curvature in between.
+        matrix, right = np.eye(len(self.theta)), np.zeros(len(self.theta))
+        right[[0, -1]] = 0.5 * (slope[0] + slope[-1])
+        for k in range(1, len(self.theta) - 1):
+            matrix[k, k - 1 : k + 2] = 1 / step[k - 1], 2 / step[k - 1] + 2 / step[k], 1 / step[k]
+            right[k] = 3.0 * (slope[k - 1] / step[k - 1] + slope[k] / step[k])
+        m = np.linalg.solve(matrix, right)
+        cubic = (m[:-1] + m[1:] - 2.0 * slope) / step**2
+        square = (3.0 * slope - 2.0 * m[:-1] - m[1:]) / step
+        return np.column_stack([cubic, square, m[:-1], self.psi[:-1]])
 
     def compute_limit(self, theta: ArrayLike) -> Array:
-        """Largest swing [rad] at circumduction angles [rad]; a cubic overshoots, so it is clipped to its knots."""
-        return np.asarray(np.clip(self.spline(theta), self.psi.min(), self.psi.max()), float)
+        """Largest swing [rad] at circumduction angles [rad]; clipped to its knots, as a cubic overshoots."""
+        theta = np.asarray(theta, float)
+        piece = np.clip(np.searchsorted(self.theta, theta, side="right") - 1, 0, len(self.theta) - 2)
+        x, c = theta - self.theta[piece], self.cubics[piece]
+        psi = ((c[..., 0] * x + c[..., 1]) * x + c[..., 2]) * x + c[..., 3]
+        return np.asarray(np.clip(psi, self.psi.min(), self.psi.max()), float)
 
 
 @dataclass(frozen=True)

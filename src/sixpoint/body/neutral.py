@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.dofs import Hinges
+from sixpoint.body.flexion import bone_between, find_flexion_axes
 from sixpoint.body.motion import Motion
 from sixpoint.body.roles import Roles
-from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.skeleton import Index, Skeleton
 from sixpoint.body.structure import foot_direction
 from sixpoint.errors import FigureError
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 X, Y, Z = np.eye(3)
 SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be that axis
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
-MIN_BEND = np.radians(8.0)  # smallest bend that tells a flexion axis
+STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
 
 
 def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = None) -> Array:
@@ -38,22 +38,27 @@ def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = No
     Raises:
         FigureError: A limb has no length, or neither rest pose nor motion tell which way is up.
     """
-    rest = np.tile(rot.IDENTITY, (len(skeleton), 1))
+    local = np.tile(rot.IDENTITY, (len(skeleton), 1))
     frames = _sample(motion)
-    world_axes = _standing_axes(skeleton, roles, rest)
+    world_axes = _standing_axes(skeleton, roles, local)
+    below_pelvis = skeleton.subtree(roles.pelvis)
     if world_axes is not None:
-        neutral = rot.mul(rot.inv(world_axes), skeleton.compute_transforms(rest)[1])
+        neutral = rot.mul(rot.inv(world_axes), skeleton.compute_transforms(local)[1])
     elif frames is not None:
-        neutral = _trunk_from_motion(skeleton, roles, frames)
+        # The rest pose is no posture: hands, feet and the trunk take their mean of the recording instead.
+        local[below_pelvis[1:]] = rot.mean(frames[:, below_pelvis[1:]])
+        neutral = _trunk_from_motion(skeleton, roles, local)
     else:
         raise FigureError(
             "the rest pose is not a standing one and there is no motion to learn it from: "
             "load the rig with a recording, or give it a T-pose, A-pose or arms-down rest pose"
         )
     neutral = np.array(neutral)
-    neutral[skeleton.path(0, roles.pelvis)[:-1]] = rot.IDENTITY  # what is above the pelvis stands still
+    neutral[np.setdiff1d(np.arange(len(skeleton)), below_pelvis)] = rot.IDENTITY  # what is above stands still
     for limb, chain in enumerate(roles.limbs):
-        _set_limb(skeleton, roles, neutral, limb, chain, motion, frames)
+        _set_limb(skeleton, neutral, chain, limb >= 2, motion, frames)
+    for ankle in roles.ankle:
+        _level_foot(skeleton, neutral, ankle, local)
     return rot.normalised(neutral)
 
 
@@ -69,13 +74,16 @@ def _sample(motion: Motion | None) -> Array | None:
 
 
 def _standing_axes(skeleton: Skeleton, roles: Roles, rest: Array) -> Array | None:
-    """Rotation world<-anatomical of a standing rest pose, or None if the rest pose does not stand."""
+    """Rotation (4,) world<-anatomical of a standing rest pose, or None if the rest pose does not stand."""
     positions, world = skeleton.compute_transforms(rest)
     head = positions[roles.head] + rot.mul_vec(world[roles.head], roles.head_offset)
     pelvis, hips = positions[roles.pelvis], positions[list(roles.hip)]
     legs = rot.unit(positions[list(roles.ankle)] - hips)
     trunk = rot.unit(head - pelvis)
     if legs[0] @ legs[1] < 0.3 or -trunk @ rot.unit(legs.sum(axis=0)) < 0.8:
+        return None
+    chains = [*roles.limbs[2:], (roles.pelvis, *roles.spine)]
+    if any(_straightness(positions[list(chain)]) < STRAIGHT for chain in chains):
         return None
     up = _snapped(rot.unit(trunk - rot.unit(legs.sum(axis=0))))
     across = hips[0] - hips[1]
@@ -89,43 +97,44 @@ def _standing_axes(skeleton: Skeleton, roles: Roles, rest: Array) -> Array | Non
     return rot.from_axes(left, up, np.cross(left, up))
 
 
+def _straightness(points: Array) -> float:
+    """Distance between the ends of a chain of points (n, 3) over its length."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    return float(np.linalg.norm(points[-1] - points[0]) / length) if length > 0 else 1.0
+
+
 def _snapped(direction: Array) -> Array:
     """The nearest of the six world axes if it is within SNAP, else the direction itself."""
     k = int(np.argmax(np.abs(direction)))
     axis = np.eye(3)[k] * np.sign(direction[k])
-    return axis if direction @ axis > np.cos(SNAP) else direction
+    return np.asarray(axis if direction @ axis > np.cos(SNAP) else direction)
 
 
-def _trunk_from_motion(skeleton: Skeleton, roles: Roles, frames: Array) -> Array:
-    """Neutral rotations where the rest pose says nothing: mean twist of the recording, trunk straight.
+def _trunk_from_motion(skeleton: Skeleton, roles: Roles, local: Array) -> Array:
+    """Neutral rotations (J, 4) where the rest pose says nothing: trunk straightened from a mean posture.
 
-    Each trunk joint keeps the mean orientation it has to the pelvis, then turns so that its bone points
-    up; limbs are set afterwards, and what is beyond them keeps its rest rotation.
+    Each trunk joint keeps its mean twist to the one below, then turns so that its bone points up; limbs are
+    set afterwards.
     """
     trunk = [roles.pelvis, *roles.spine]
-    local = np.tile(rot.IDENTITY, (len(skeleton), 1))
-    chained = {j for c in (*trunk, *roles.clavicle) for j in skeleton.path(0, c)}
-    chained -= set(skeleton.path(0, roles.pelvis))
-    for joint in chained:
-        local[joint] = rot.mean(frames[:, joint])
     positions, world = skeleton.compute_transforms(local)
     hips = positions[list(roles.hip)]
     left = rot.unit(hips[0] - hips[1])
-    bone = _trunk_bone(skeleton, roles, positions, world, 0)
+    bone = _trunk_bone(roles, positions, world, 0)
     up = rot.unit(bone - (bone @ left) * left)
     if not (left.any() and up.any()):
         raise FigureError("hips or spine have no extent: the pelvis' axes cannot be found")
     neutral = rot.mul(rot.inv(rot.from_axes(left, up, np.cross(left, up))), world)
     for k, joint in enumerate(trunk):
-        bone = rot.mul_vec(neutral[joint], rot.mul_vec(rot.inv(world[joint]), _trunk_bone(skeleton, roles, positions, world, k)))
+        bone = rot.mul_vec(rot.inv(world[joint]), _trunk_bone(roles, positions, world, k))
         if bone.any() and k:
-            fix = rot.between(rot.unit(bone), Y)
-            below = [j for j in range(len(skeleton)) if skeleton.path(joint, j)]
+            below = skeleton.subtree(joint)
+            fix = rot.between(rot.unit(rot.mul_vec(neutral[joint], bone)), Y)
             neutral[below] = rot.mul(fix, neutral[below])
     return neutral
 
 
-def _trunk_bone(skeleton: Skeleton, roles: Roles, positions: Array, world: Array, k: int) -> Array:
+def _trunk_bone(roles: Roles, positions: Array, world: Array, k: int) -> Array:
     """World vector from trunk joint k to the next trunk point that is not at the same place."""
     trunk = [roles.pelvis, *roles.spine]
     points = [positions[j] for j in trunk] + [
@@ -142,39 +151,32 @@ def _trunk_bone(skeleton: Skeleton, roles: Roles, positions: Array, world: Array
 
 def _set_limb(
     skeleton: Skeleton,
-    roles: Roles,
     neutral: Array,
-    limb: int,
     chain: tuple[int, int, int],
+    flexes_back: bool,
     motion: Motion | None,
     frames: Array | None,
 ) -> None:
-    """Hang one limb straight down with its flexion axis along X; joints beyond it follow."""
+    """Hang one limb straight down with its flexion axis along X; joints beyond it follow.
+
+    Knees fold backward (``flexes_back``), elbows forward.
+    """
     root, middle, end = chain
-    flexes_back = limb >= 2  # knees fold backward, elbows forward
-    upper, lower = _bone(skeleton, root, middle), _bone(skeleton, middle, end)
+    upper, lower = bone_between(skeleton, root, middle), bone_between(skeleton, middle, end)
     for bone, a, b in ((upper, root, middle), (lower, middle, end)):
         if np.linalg.norm(bone) < 1e-6:
             names = skeleton.names
             raise FigureError(f"no distance between {names[a]!r} and {names[b]!r}: the limb has no length")
     # Anatomical guess: hang the rest limb down along the shortest way, and take X there.
-    hang = rot.between(rot.unit(rot.mul_vec(neutral[root], upper)), -Y)
+    along = rot.unit(rot.mul_vec(neutral[root], upper))
+    hang = rot.from_axis_angle(X, np.pi) if along @ Y > 0.99 else rot.between(along, -Y)
     guess = rot.mul_vec(rot.inv(neutral[root]), rot.mul_vec(rot.inv(hang), X))
-    axis_upper, axis_lower = _flexion_axes(skeleton, chain, guess, flexes_back, motion, frames)
-    below = [j for j in range(len(skeleton)) if skeleton.path(root, j)]
-    _turn(neutral, below, root, axis_upper, upper)
-    below = [j for j in below if skeleton.path(middle, j)]
-    _turn(neutral, below, middle, axis_lower, lower)
-    if flexes_back:
-        _level_foot(skeleton, neutral, end)
+    axis_upper, axis_lower = find_flexion_axes(skeleton, chain, guess, flexes_back, motion, frames)
+    _turn(neutral, skeleton.subtree(root), root, axis_upper, upper)
+    _turn(neutral, skeleton.subtree(middle), middle, axis_lower, lower)
 
 
-def _bone(skeleton: Skeleton, joint: int, below: int) -> Array:
-    """Vector from ``joint`` to ``below`` in the frame of ``joint``, joints between at rest [m]."""
-    return np.asarray(skeleton.offsets[skeleton.path(joint, below)[1:]].sum(axis=0))
-
-
-def _turn(neutral: Array, below: list[int], joint: int, axis: Array, bone: Array) -> None:
+def _turn(neutral: Array, below: Index, joint: int, axis: Array, bone: Array) -> None:
     """Set ``joint`` so that ``bone`` points down and ``axis`` left; what is below turns along."""
     y = -rot.unit(bone)
     x = rot.unit(axis - (axis @ y) * y)
@@ -183,74 +185,14 @@ def _turn(neutral: Array, below: list[int], joint: int, axis: Array, bone: Array
     neutral[below] = rot.mul(change, neutral[below])
 
 
-def _level_foot(skeleton: Skeleton, neutral: Array, ankle: int) -> None:
+def _level_foot(skeleton: Skeleton, neutral: Array, ankle: int, local: Array) -> None:
     """Point a foot forward where the rest pose does not: rigs whose rest has the foot along the shank."""
-    bone = foot_direction(skeleton, ankle)
+    bone = foot_direction(skeleton, ankle, local)
     if bone is None:
         return
     foot = rot.mul_vec(neutral[ankle], bone)
     if foot @ Z > 0.5:
         return
     level = rot.unit(Z - 0.4 * Y)  # about the slope from ankle to toes
-    below = [j for j in range(len(skeleton)) if skeleton.path(ankle, j)]
+    below = skeleton.subtree(ankle)
     neutral[below] = rot.mul(rot.between(foot, level), neutral[below])
-
-
-def _flexion_axes(
-    skeleton: Skeleton,
-    chain: tuple[int, int, int],
-    guess: Array,
-    flexes_back: bool,
-    motion: Motion | None,
-    frames: Array | None,
-) -> tuple[Array, Array]:
-    """Anatomical X axis (3,) in the frames of the limb's upper and lower joint.
-
-    From the file's degrees of freedom, else from the motion, else from the bend of the rest pose, else
-    from anatomy (``guess``).
-    """
-    root, middle, end = chain
-    upper, lower = rot.unit(_bone(skeleton, root, middle)), rot.unit(_bone(skeleton, middle, end))
-    between = skeleton.path(root, middle)[1:]
-    forearms = None if frames is None else rot.mul_vec(_chained(frames, between), lower)
-    axis = None if forearms is None else _axis_of_bends(upper, forearms, flexes_back)
-    dof = motion.dofs[middle] if motion is not None else None
-    if isinstance(dof, Hinges) and dof.size == 1 and abs(float(dof.axes[0] @ lower)) < 0.5:
-        hinge = dof.axes[0]
-        reference = guess if axis is None else axis
-        hinge = hinge if hinge @ reference >= 0 else -hinge
-        return hinge, hinge
-    if axis is not None and frames is not None:
-        in_lower = rot.mul_vec(rot.inv(_chained(frames, between)), axis).mean(axis=0)
-        in_lower = in_lower - (in_lower @ lower) * lower
-        if np.linalg.norm(in_lower) > 0.3:
-            return axis, rot.unit(in_lower)
-    axis = _axis_of_bends(upper, lower[None], flexes_back)
-    if axis is None or axis @ guess < 0.5:
-        axis = guess
-    return axis, axis
-
-
-def _chained(frames: Array, joints: list[int]) -> Array:
-    """Product of the local rotations of consecutive joints, (F, 4)."""
-    out = frames[:, joints[0]]
-    for joint in joints[1:]:
-        out = rot.mul(out, frames[:, joint])
-    return out
-
-
-def _axis_of_bends(upper: Array, lower: Array, flexes_back: bool) -> Array | None:
-    """Anatomical X axis in the upper joint's frame from lower-limb directions (F, 3) seen there.
-
-    A limb bends one way: the parts of ``lower`` across ``upper`` lie along one direction, which is
-    forward for elbows and backward for knees.
-    """
-    across = lower - (lower @ upper)[:, None] * upper
-    if np.sqrt(np.mean(np.sum(across**2, axis=1))) < np.sin(MIN_BEND):
-        return None
-    values, vectors = np.linalg.eigh(across.T @ across)
-    if values[-1] < 4.0 * values[-2]:  # bends in all directions: not a hinge
-        return None
-    toward = vectors[:, -1] * np.sign(across.sum(axis=0) @ vectors[:, -1])
-    forward = -toward if flexes_back else toward
-    return rot.unit(np.cross(-upper, forward))

@@ -27,7 +27,7 @@ def mul(a: ArrayLike, b: ArrayLike) -> Array:
 
 def inv(q: ArrayLike) -> Array:
     """Inverse of unit quaternions, shape (..., 4)."""
-    return np.asarray(q, float) * np.array([-1.0, -1.0, -1.0, 1.0])
+    return np.asarray(np.asarray(q, float) * [-1.0, -1.0, -1.0, 1.0])
 
 
 def mul_vec(q: ArrayLike, v: ArrayLike) -> Array:

@@ -27,7 +27,7 @@ def frozen(values: object, dtype: type = np.float64) -> NDArray[np.generic]:
         owner = values if values.base is None else values.base
         if not values.flags.writeable and not getattr(owner, "flags", values.flags).writeable:
             return values
-    array = np.array(values, dtype=dtype, order="C")
+    array: NDArray[np.generic] = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array
 

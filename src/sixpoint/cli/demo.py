@@ -20,8 +20,9 @@ LEGEND = (
     ("mean cm", "the same as a mean distance"),
     ("rad", "angle of the joints to the truth"),
     ("worst cm", "largest distance of one of the six points to its target"),
-    ("missed", "frames with a point more than 1 cm off: beyond reach or limits"),
+    ("missed", "frames with a point more than 1 cm off: beyond reach or limits (see --no-limits)"),
 )
+
 
 def demo(
     *,
@@ -60,7 +61,7 @@ def demo(
             out,
             names=sample or (),
             stature=stature,
-            solving=Solving(weights=job.WEIGHTS, limits=not no_limits),
+            solving=Solving(limits=not no_limits),
             force=force,
             progress=progress,
         )
@@ -96,6 +97,7 @@ def _point_on(screen: Screen, out: Path, name: str) -> None:
             (f"look at {out / name}.png", "the result over the truth; open the .bvh files in Blender"),
             (f"sixpoint info {out / name}_truth.bvh", "what a file holds"),
             (f"sixpoint reconstruct {out / name}_points.csv", "pose a body from six points"),
+            ("sixpoint demo --force --no-limits", "free joints: every reachable point is met exactly"),
             ("sixpoint reconstruct RECORDING", "the same with your own .bvh or .amc"),
         ]
     )

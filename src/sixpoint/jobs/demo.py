@@ -13,10 +13,11 @@ from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.samples import SAMPLES, make_sample
+from sixpoint.solvers.sequential.solver import FIGHTING, WALKING
 from sixpoint.study.metrics import Errors, compute_errors
 
-WEIGHTS = (1.0, 1.0, 0.0)
-"""Influence of wrists, ankles and the last frame on the pelvis, as the paper has it for fast motions."""
+FAST = ("boxing", "jump_kick")
+"""Motions for which the pelvis follows wrists and ankles at once, as the paper has it for such clips."""
 ENDINGS = ("_truth.bvh", "_result.bvh", "_points.csv", ".png")
 """What is written of each motion, after its name."""
 
@@ -60,7 +61,7 @@ def demo(
     Raises:
         SixpointError: A name is unknown, or files of an earlier demonstration are in the folder.
     """
-    solving = solving or Solving(weights=WEIGHTS)
+    solving = solving or Solving()
     solving.check()
     chosen = list(dict.fromkeys(names)) or list(SAMPLES)
     unknown = [name for name in chosen if name not in SAMPLES]
@@ -71,7 +72,8 @@ def demo(
     progress("reconstructing", 0, len(chosen))
     clips = []
     for number, name in enumerate(chosen, start=1):
-        clips.append(_run(name, figure, out, solving))
+        weights = FIGHTING if name in FAST else WALKING
+        clips.append(_run(name, figure, out, replace(solving, weights=solving.weights or weights)))
         progress("reconstructing", number, len(chosen))
     return clips
 

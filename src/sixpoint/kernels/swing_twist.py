@@ -96,6 +96,6 @@ def build_ball_rows(limits):
             row[SWING : SWING + 3] = limit.psi.min(), limit.psi.max(), cos(0.5 * limit.psi.min())
             row[TWIST : TWIST + 2] = limit.twist
             knots[: pieces + 1] = limit.theta
-            cubics[:pieces] = limit.spline.c.T
+            cubics[:pieces] = limit.cubics
         row[KNOTS:] = np.concatenate([knots, cubics.ravel()])
     return rows

@@ -11,7 +11,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 Array = NDArray[np.float64]
 Keys: TypeAlias = Mapping[float, ArrayLike]
@@ -46,6 +45,8 @@ def curve(keys: Keys, at: Array, period: float | None = None) -> Array:
         at = np.mod(at, period)
         times = np.concatenate([times - period, times, times + period])
         values = np.concatenate([values, values, values])
+    from scipy.interpolate import PchipInterpolator  # slow to import, and only samples need it
+
     return np.asarray(PchipInterpolator(times, values, axis=0)(at), float)
 
 
@@ -53,6 +54,8 @@ def ballistic(keys: Mapping[float, tuple[float, float]], at: Array) -> Array:
     """A curve (F,) through {time: (value, slope)}; free fall is such a curve, exactly."""
     times = np.array(list(keys), float)
     values, slopes = np.array(list(keys.values()), float).T
+    from scipy.interpolate import CubicHermiteSpline
+
     return np.asarray(CubicHermiteSpline(times, values, slopes)(np.clip(at, times[0], times[-1])), float)
 
 
