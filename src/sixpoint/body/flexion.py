@@ -34,7 +34,8 @@ def find_flexion_axes(
     from anatomy (``guess``).
     """
     root, middle, end = chain
-    upper, lower = rot.unit(bone_between(skeleton, root, middle)), rot.unit(bone_between(skeleton, middle, end))
+    upper = rot.unit(bone_between(skeleton, root, middle))
+    lower = rot.unit(bone_between(skeleton, middle, end))
     between = skeleton.path(root, middle)[1:]
     forearms = None if frames is None else rot.mul_vec(_chained(frames, between), lower)
     axis = None if forearms is None else _axis_of_bends(upper, forearms, flexes_back)

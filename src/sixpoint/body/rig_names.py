@@ -13,6 +13,7 @@ from typing import Any
 from sixpoint.body.skeleton import Skeleton
 
 SIDES = ("l", "r")
+DIGITS = "0123456789"
 _SIDE_WORDS = ("left", "l", "right", "r")
 
 Named = dict[tuple[str, str], int]
@@ -44,8 +45,10 @@ def split_name(name: str) -> tuple[str, str]:
             return side, base[len(word) :]
         if base.endswith(word):
             return side, base[: -len(word)]
-    if base[:1] in SIDES and base[1:] in _vocabulary():
-        return base[0], base[1:]
+    for k in range(len(tokens)):  # "lfemur", "LUArm": a letter glued to a known word
+        before, rest = "".join(tokens[:k]), "".join(tokens[k:])
+        if rest[:1] in SIDES and rest[1:].rstrip(DIGITS) in _vocabulary():
+            return rest[0], before + rest[1:]
     return "", base
 
 
@@ -80,7 +83,7 @@ def _read_names(skeleton: Skeleton) -> Named:
     for joint, key in enumerate(split):
         named.setdefault(key, joint)
     for joint, (side, base) in enumerate(split):  # "upperleg01.L", "LeftUpLeg_056"
-        named.setdefault((side, base.rstrip("0123456789")), joint)
+        named.setdefault((side, base.rstrip(DIGITS)), joint)
     return named
 
 
