@@ -1,4 +1,5 @@
 """Rigs for the tests of body/: real files, the built-in figure under other names, frames and rest poses."""
+# ruff: noqa: E501
 
 from __future__ import annotations
 
@@ -61,7 +62,12 @@ def family_skeleton(family: str, prefix: str = "", suffix: str = "") -> sp.Skele
         carriers += [first + 2, first + 6]
         places += [[0, -0.06, 0.2], [sign * 0.18, 0, 0]]
     return sp.Skeleton(
-        tuple(names), np.array(parents), np.array(offsets, float), tuple(sites), np.array(carriers), np.array(places)
+        tuple(names),
+        np.array(parents),
+        np.array(offsets, float),
+        tuple(sites),
+        np.array(carriers),
+        np.array(places),
     )
 
 
@@ -98,7 +104,9 @@ def exercise(figure: sp.Figure, frames: int = 120, seed: int = 0) -> sp.Motion:
     return figure.compute_motion(local, pelvis, 60.0)
 
 
-def reframed(motion: sp.Motion, frames: np.ndarray, scale: float = 1.0, names: list[str] | None = None) -> sp.Motion:
+def reframed(
+    motion: sp.Motion, frames: np.ndarray, scale: float = 1.0, names: list[str] | None = None
+) -> sp.Motion:
     """The same movement on a rig whose joint frames are turned by constants (J, 4): other rest pose, same body."""
     s = motion.skeleton
     above = np.maximum(s.parents, 0)

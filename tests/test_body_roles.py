@@ -6,15 +6,15 @@ import time
 
 import numpy as np
 import pytest
-from body_rigs import FAMILIES, family_skeleton, load, real_rigs, renamed
 
 import sixpoint as sp
+from body_rigs import FAMILIES, family_skeleton, load, real_rigs, renamed
 from sixpoint.body.rig_names import split_name
 from sixpoint.body.roles import find_roles
 from sixpoint.errors import FigureError, FormatError
 
 RIGS = [pytest.param(p, id=p.name) for p in real_rigs()] or [
-    pytest.param(None, marks=pytest.mark.skip(reason="no recordings in $SIXPOINT_DATA or ../shared/data"))
+    pytest.param(None, marks=pytest.mark.skip(reason="no recordings: set $SIXPOINT_DATA"))
 ]
 EXPECTED = {
     "pelvis": 0, "spine_1": 1, "spine_2": 2, "head": 3, "l_clavicle": 7, "r_clavicle": 14, "l_hip": 4, "r_hip": 11,
@@ -25,7 +25,8 @@ EXPECTED = {
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize(
-    ("prefix", "suffix"), [("", ""), ("mixamorig:", ""), ("mixamorig_", ""), ("Character1_", ""), ("", "_056")]
+    ("prefix", "suffix"),
+    [("", ""), ("mixamorig:", ""), ("mixamorig_", ""), ("Character1_", ""), ("", "_056")],
 )
 def test_every_naming_family_is_read(family, prefix, suffix):
     """All naming families give the same roles, with and without namespace, prefix and numbers."""
@@ -79,7 +80,7 @@ def test_real_rigs_are_found_by_name(path):
 
 
 def test_left_is_left_by_structure():
-    """Feet tell left from right; a rig turned about is still read rightly, and mirrored order does not matter."""
+    """Feet tell left from right; turned and mirrored rigs are read rightly."""
     s = family_skeleton("unity")
     plain = renamed(s, [f"b{j}" for j in range(len(s))])
     assert find_roles(plain).named() == EXPECTED
@@ -155,7 +156,11 @@ def test_what_is_missing_is_listed():
 def test_helper_joints_do_no_harm():
     """Twist bones, weapons and mesh helpers neither hide nor become limbs."""
     s = family_skeleton("unreal")
-    extra = [("upperarm_twist_01_l", 8, [0.15, 0, 0]), ("weapon_r", 17, [-0.5, 0, 0.3]), ("mesh", 9, [0.0, 0, 0])]
+    extra = [
+        ("upperarm_twist_01_l", 8, [0.15, 0, 0]),
+        ("weapon_r", 17, [-0.5, 0, 0.3]),
+        ("mesh", 9, [0.0, 0, 0]),
+    ]
     rig = sp.Skeleton(
         s.names + tuple(n for n, _, _ in extra), [*s.parents, *(p for _, p, _ in extra)],
         np.vstack([s.offsets, [o for _, _, o in extra]]), s.site_names, s.site_parents, s.site_offsets,
@@ -179,7 +184,11 @@ def test_any_spine(count, clavicles):
         offsets += [[sign * 0.1, -0.05, 0], [0, -0.4, 0], [0, -0.4, 0]]
         arm = len(names)
         if clavicles:
-            names, parents, offsets = [*names, f"{word}Shoulder"], [*parents, chest], [*offsets, [sign * 0.05, 0.1, 0]]
+            names, parents, offsets = (
+                [*names, f"{word}Shoulder"],
+                [*parents, chest],
+                [*offsets, [sign * 0.05, 0.1, 0]],
+            )
         names += [f"{word}{w}" for w in ("Arm", "ForeArm", "Hand")]
         parents += [arm if clavicles else chest, len(names) - 3, len(names) - 2]
         offsets += [[sign * 0.15, 0.05, 0], [sign * 0.3, 0, 0], [sign * 0.25, 0, 0]]

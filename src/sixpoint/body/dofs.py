@@ -212,7 +212,7 @@ def _coordinates(dof: JointDof, quat: Array) -> Array:
     if dof.size == 1:
         twist = 2.0 * np.arctan2(float(quat[:3] @ dof.axes[0]), float(quat[3]))
         return np.array([(twist + np.pi) % (2 * np.pi) - np.pi])
-    axes = dof.axes
+    axes = np.array(dof.axes)  # SciPy wants a writable array
     if dof.size == 2:
         axes = np.vstack([axes, np.cross(axes[0], axes[1])])
     angles = Rotation.from_quat(quat).as_davenport(axes, "intrinsic", suppress_warnings=True)

@@ -67,7 +67,7 @@ def _sample(motion: Motion | None) -> Array | None:
     if motion is None:
         return None
     picks = np.unique(np.linspace(0, len(motion) - 1, MAX_FRAMES).astype(int))
-    return motion.rotations[picks]
+    return np.asarray(motion.rotations[picks])
 
 
 # --- trunk ---------------------------------------------------------------------------------------
