@@ -17,7 +17,8 @@ RIGS = [pytest.param(p, id=p.name) for p in real_rigs()] or [
     pytest.param(None, marks=pytest.mark.skip(reason="no recordings: set $SIXPOINT_DATA"))
 ]
 EXPECTED = {
-    "pelvis": 0, "spine_1": 1, "spine_2": 2, "head": 3, "l_clavicle": 7, "r_clavicle": 14, "l_hip": 4, "r_hip": 11,
+    "pelvis": 0, "spine_1": 1, "spine_2": 2, "head": 3, "l_clavicle": 7, "r_clavicle": 14,
+    "l_hip": 4, "r_hip": 11,
     "l_knee": 5, "r_knee": 12, "l_ankle": 6, "r_ankle": 13, "l_shoulder": 8, "r_shoulder": 15, "l_elbow": 9,
     "r_elbow": 16, "l_wrist": 10, "r_wrist": 17,
 }  # fmt: skip
