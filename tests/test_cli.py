@@ -283,7 +283,7 @@ def test_compilation_is_announced(place, capsys, monkeypatch):
     """A first run says why it takes a moment."""
     monkeypatch.setattr("sixpoint.solvers.sequential.solver.is_cached", lambda name: False)
     code, _, err = run(capsys, "reconstruct", "walk.bvh")
-    assert (code, err) == (0, "note: compiling kernels, once (a few seconds)\n")
+    assert (code, err) == (0, "note: compiling kernels, once (about ten seconds)\n")
 
 
 def shell(*words: str, **env: str) -> subprocess.CompletedProcess[str]:

@@ -26,10 +26,17 @@ PACKAGE = Path(__file__).resolve().parents[1]
 COMPILED_ROOMS = ("kernels", "solvers")
 
 
+OPTIONS = {
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+    "no_rewrites": True,  # no array expressions to fuse, so do not look for them
+    "_nrt": False,  # compiled code allocates nothing: Numba refuses what would
+}
+
+
 def helper(function: F) -> F:
     """Mark a function for use inside compiled code; from Python it is an ordinary function."""
-    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
-    return register_jitable(**options)(function)  # type: ignore[no-any-return]
+    return register_jitable(no_cpython_wrapper=True, **OPTIONS)(function)  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:
@@ -38,7 +45,7 @@ def entry(function: F) -> F:
     if CACHE is not None:
         numba.config.CACHE_DIR = str(CACHE)
     try:
-        return numba.njit(cache=CACHE is not None, error_model="numpy", nogil=True)(function)
+        return numba.njit(cache=CACHE is not None, nogil=True, **OPTIONS)(function)
     finally:
         numba.config.CACHE_DIR = previous
 

@@ -142,7 +142,7 @@ class SequentialIK:
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the neutral pose."""
         if not is_cached("solve_frames"):
-            log.warning("compiling kernels, once (a few seconds)")
+            log.warning("compiling kernels, once (about ten seconds)")
         rest = self.figure.rest_positions
         r = self.figure.roles
         points = rest[[r.pelvis, r.head, *r.wrist, *r.ankle]]
