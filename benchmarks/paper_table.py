@@ -1,6 +1,6 @@
 """Measure Sequential IK on the clips of the paper and write the table between the marks of docs/results.md.
 
-    python benchmarks/paper_table.py [--data FOLDER]
+python benchmarks/paper_table.py [--data FOLDER]
 """
 
 from __future__ import annotations
@@ -56,19 +56,21 @@ def table(folder: Path) -> list[str]:
     literal = np.mean([measure(folder, name, limits=False, search="literal")[:2] for name in PAPER], axis=0)
     lines.append("")
     lines.append(
-        f"With the literal steps of Algorithm 3 (`search=\"literal\"`, limits off) the average is "
+        f'With the literal steps of Algorithm 3 (`search="literal"`, limits off) the average is '
         f"{literal[0]:.4f} / {literal[1]:.4f}."
     )
     return lines
 
 
 def row(name, missed, free, limited, paper) -> str:
+    """One Markdown row; None leaves a cell empty."""
     reached = "" if missed is None else f"{100 * (1 - missed):.0f} %"
     cells = ["" if e is None else f"{e[0]:.4f} / {e[1]:.4f}" for e in (free, limited, paper)]
     return f"| {name} | {reached} | {cells[0]} | {cells[1]} | {cells[2]} |"
 
 
 def main() -> None:
+    """Write the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     lines = table(parser.parse_args().data)

@@ -9,6 +9,7 @@ forward kinematics of the same figure, timed in the same rounds, says more than 
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import subprocess
 import sys
@@ -60,6 +61,7 @@ def load_clips(folder: Path) -> list[sp.Motion]:
 
 
 def seconds(function) -> float:
+    """Time of one call [s]."""
     start = time.perf_counter()
     function()
     return time.perf_counter() - start
@@ -73,8 +75,11 @@ def measure(motion: sp.Motion, limits: bool, rounds: int) -> dict[str, float]:
     result = solver.solve_motion(targets)
     joints = len(figure.skeleton)
     arrays = (
-        np.array(figure.skeleton.parents), np.array(figure.skeleton.offsets), np.array(result.rotations),
-        np.array(result.translations[:, 0]), np.empty((len(motion), joints, 3)),
+        np.array(figure.skeleton.parents),
+        np.array(figure.skeleton.offsets),
+        np.array(result.rotations),
+        np.array(result.translations[:, 0]),
+        np.empty((len(motion), joints, 3)),
         np.empty((len(motion), joints, 4)),
     )
     forward_kinematics(*arrays)
@@ -102,8 +107,6 @@ def start_up(cold: bool) -> float:
     """Seconds from a fresh interpreter's first line to the first pose."""
     with tempfile.TemporaryDirectory() as folder:
         env = {"NUMBA_CACHE_DIR": folder} if cold else {}
-        import os
-
         run = subprocess.run(
             [sys.executable, "-c", START], env=os.environ | env, capture_output=True, text=True, check=True
         )
@@ -111,12 +114,16 @@ def start_up(cold: bool) -> float:
 
 
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--rounds", type=int, default=30)
     options = parser.parse_args()
     clips = load_clips(options.data)
-    print(f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__}")
+    print(
+        f"{platform.machine()}, Python {platform.python_version()}, "
+        f"NumPy {np.__version__}, Numba {numba.__version__}"
+    )
     print("times in us per frame: median (p99); FK is a compiled batched forward kinematics of the same rig")
     header = f"{'clip':<20}{'limits':>7}{'solve_motion':>18}{'FK':>7}{'ratio':>7}{'single solve':>18}"
     print(header)
@@ -126,7 +133,8 @@ def main() -> None:
             row = measure(motion, limits, options.rounds)
             rows.append(row)
             print(
-                f"{motion.name:<20}{'on' if limits else 'off':>7}{row['batch']:>10.2f} ({row['batch_p99']:5.2f})"
+                f"{motion.name:<20}{'on' if limits else 'off':>7}"
+                f"{row['batch']:>10.2f} ({row['batch_p99']:5.2f})"
                 f"{row['fk']:>7.2f}{row['ratio']:>7.2f}{row['single']:>10.2f} ({row['single_p99']:5.2f})"
             )
         middle = {key: float(np.median([row[key] for row in rows])) for key in rows[0]}
@@ -134,7 +142,9 @@ def main() -> None:
             f"{'median of clips':<20}{'on' if limits else 'off':>7}{middle['batch']:>10.2f}{'':8}"
             f"{middle['fk']:>7.2f}{middle['ratio']:>7.2f}{middle['single']:>10.2f}"
         )
-    print(f"first pose of a new process: {start_up(False):.2f} s warm, {start_up(True):.1f} s with compilation")
+    print(
+        f"first pose of a new process: {start_up(False):.2f} s warm, {start_up(True):.1f} s with compilation"
+    )
 
 
 if __name__ == "__main__":

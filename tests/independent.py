@@ -77,7 +77,7 @@ def anatomical(figure: Figure, motion: Motion, joint: int, parent: int) -> np.nd
 
 
 def limit_excess(limit: SwingTwist, matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far rotations (F, 3, 3) are outside swing and twist limits [rad], by matrices and SciPy's spline."""
+    """How far rotations (F, 3, 3) are outside swing and twist limits [rad], by matrices."""
     segment = matrices @ limit.axis
     psi = np.arctan2(np.linalg.norm(np.cross(limit.axis, segment), axis=1), segment @ limit.axis)
     theta = np.arctan2(segment @ limit.side, segment @ limit.forward)
@@ -86,8 +86,10 @@ def limit_excess(limit: SwingTwist, matrices: np.ndarray) -> tuple[np.ndarray, n
     length = np.linalg.norm(turn, axis=1, keepdims=True)
     back = Rotation.from_rotvec(np.where(length > 1e-12, turn / np.maximum(length, 1e-12), 0) * psi[:, None])
     left = back.as_matrix() @ matrices
-    tau = np.arctan2(np.einsum("fi,fi->f", left @ limit.forward, np.tile(limit.side, (len(left), 1))),
-                     np.einsum("fi,fi->f", left @ limit.forward, np.tile(limit.forward, (len(left), 1))))
+    tau = np.arctan2(
+        np.einsum("fi,fi->f", left @ limit.forward, np.tile(limit.side, (len(left), 1))),
+        np.einsum("fi,fi->f", left @ limit.forward, np.tile(limit.forward, (len(left), 1))),
+    )
     if np.cross(limit.axis, limit.forward) @ limit.side < 0:
         tau = -tau
     swing = psi - limit.compute_limit(theta)

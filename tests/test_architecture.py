@@ -80,5 +80,7 @@ def test_every_public_name_has_one_place_and_a_docstring():
 
 def test_files_stay_small():
     """No source file grows beyond 350 lines."""
-    long = {str(p.relative_to(PACKAGE)): n for p in FILES if (n := len(p.read_text("utf-8").splitlines())) > 350}
+    long = {
+        str(p.relative_to(PACKAGE)): n for p in FILES if (n := len(p.read_text("utf-8").splitlines())) > 350
+    }
     assert not long

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from independent import read_bvh_positions
 from scipy.spatial.transform import Rotation
 
 from conftest import recordings
+from independent import read_bvh_positions
 from sixpoint import formats
 from sixpoint.body.anthropometry import build_skeleton
 from sixpoint.body.motion import FileSpace, Motion
@@ -67,7 +67,12 @@ def make_motion(seed: int = 0, joints: int = 12, frames: int = 7, moving: int = 
     movers = (0, *sorted(rng.choice(np.arange(1, joints), moving, replace=False)))
     translations = rng.normal(size=(frames, len(movers), 3))
     return Motion(
-        skeleton, rotations, translations, 60.0, tuple(map(int, movers)), space=FileSpace(**space)  # type: ignore[arg-type]
+        skeleton,
+        rotations,
+        translations,
+        60.0,
+        tuple(map(int, movers)),
+        space=FileSpace(**space),  # type: ignore[arg-type]
     )
 
 
@@ -85,9 +90,7 @@ def assert_same(first: Motion, second: Motion, tolerance: float = 1e-6) -> None:
     )
     assert turned.magnitude().max() < tolerance
     np.testing.assert_allclose(second.positions[:, order], first.positions, atol=tolerance)
-    ends = [
-        sorted(m.skeleton.compute_sites(*m.transforms)[0].round(5).tolist()) for m in (first, second)
-    ]
+    ends = [sorted(m.skeleton.compute_sites(*m.transforms)[0].round(5).tolist()) for m in (first, second)]
     np.testing.assert_allclose(ends[0], ends[1], atol=2e-5)
 
 

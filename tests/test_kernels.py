@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from independent import limit_excess
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from independent import limit_excess
 from sixpoint import Limits
 from sixpoint.kernels import jit
 from sixpoint.kernels import quaternion as qt
@@ -29,7 +29,12 @@ units = arrays(float, 3, elements=finite).filter(lambda v: np.linalg.norm(v) > 0
 units = units.map(lambda v: tuple(v / np.linalg.norm(v)))
 
 LIMITS = Limits.default()
-BALLS = [LIMITS.shoulder(1.0), LIMITS.hip(-1.0), LIMITS.clavicle(np.array([1.0, 0, 0]), 1.0), *LIMITS.spine([0, 1])]
+BALLS = [
+    LIMITS.shoulder(1.0),
+    LIMITS.hip(-1.0),
+    LIMITS.clavicle(np.array([1.0, 0, 0]), 1.0),
+    *LIMITS.spine([0, 1]),
+]
 ROWS = build_ball_rows([ball.limit for ball in BALLS])
 
 

@@ -67,7 +67,7 @@ def test_an_error_in_one_joint_counts_one_22nd():
 
 
 def test_fixed_joints_between_do_not_matter():
-    """Rotation of a joint without a role counts at the next joint that has one (against its parent in the 22)."""
+    """Rotation of a joint without a role counts at the next joint that has one."""
     result = turned(MOTION, FIGURE.skeleton.index("sacroiliac"), [0.0, 0.3, 0.0])
     errors = sp.compute_errors(FIGURE, MOTION, result)
     assert errors.orientation == pytest.approx(2 * 0.3 / 22, rel=1e-9)  # both hips
@@ -109,7 +109,9 @@ def test_against_a_second_computation():
 
 def test_motions_of_another_rig_are_refused():
     """Other joints or another number of frames are errors that say so."""
-    other = sp.Motion(sp.Skeleton(("a",), np.array([-1]), np.zeros((1, 3))), [[[0, 0, 0, 1]]], [[[0, 0, 0]]], 60)
+    other = sp.Motion(
+        sp.Skeleton(("a",), np.array([-1]), np.zeros((1, 3))), [[[0, 0, 0, 1]]], [[[0, 0, 0]]], 60
+    )
     with pytest.raises(sp.SkeletonError, match="rig"):
         sp.compute_errors(FIGURE, MOTION, other)
     with pytest.raises(sp.SkeletonError, match="60 frames"):

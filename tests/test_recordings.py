@@ -1,4 +1,4 @@
-"""Real recordings: every file is reconstructed without help, and the paper's clips as well as the paper says."""
+"""Real recordings: every file is reconstructed without help, the paper's clips as well as it says."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import recordings
-from independent import anatomical, limit_excess, read_bvh_positions, world_matrices
 
 import sixpoint as sp
+from conftest import recordings
+from independent import anatomical, limit_excess, read_bvh_positions, world_matrices
 from sixpoint.body.dofs import Ball, Hinges
 
 CLIPS = {
@@ -64,7 +64,9 @@ def test_every_amc_is_reconstructed(path):
     check_reconstruction(path)
 
 
-@pytest.mark.parametrize(("limits", "position", "orientation"), [(False, 0.0246, 0.296), (True, 0.0260, 0.300)])
+@pytest.mark.parametrize(
+    ("limits", "position", "orientation"), [(False, 0.0246, 0.296), (True, 0.0260, 0.300)]
+)
 def test_the_papers_clips(data, limits, position, orientation):
     """Average errors on the three clips are as good as printed in Table 1 (0.0246, 0.2942)."""
     found = []
@@ -118,7 +120,9 @@ def test_limits_hold_on_the_papers_clips(data, name):
             assert swing.max() < 1e-6 and twist.max() < 1e-6
 
 
-@pytest.mark.parametrize("name", ["bandai/dataset-1_walk_normal_001.bvh", "xsens/example_2.bvh", "paper/17_10.amc"])
+@pytest.mark.parametrize(
+    "name", ["bandai/dataset-1_walk_normal_001.bvh", "xsens/example_2.bvh", "paper/17_10.amc"]
+)
 def test_written_result_means_the_same_to_another_reader(data, tmp_path, name):
     """A reconstruction written as BVH and read by another reader has its joints within 1e-5 m."""
     motion = load(data / name, 100)

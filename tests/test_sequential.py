@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from independent import anatomical
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from test_solvers import FIGURE, as_motion, points_of
 
 import sixpoint as sp
+from independent import anatomical
 from sixpoint.kernels import quaternion as qt
+from sixpoint.solvers.sequential.bending import flat_chord, search_angle
 from sixpoint.solvers.sequential.clavicle import solve_clavicle
 from sixpoint.solvers.sequential.limb import solve_limb
 from sixpoint.solvers.sequential.model import build_model
 from sixpoint.solvers.sequential.pelvis import estimate_x
 from sixpoint.solvers.sequential.solver import weights_at_rate
-from sixpoint.solvers.sequential.spine import chord_of, flat_chord, place_trunk, search_angle, stretch
+from sixpoint.solvers.sequential.spine import chord_of, place_trunk, stretch
+from test_solvers import FIGURE, as_motion, points_of
 
 MODEL = build_model(FIGURE)
 coordinates = st.floats(-0.7, 0.7)
@@ -112,7 +113,7 @@ def test_bending_law_has_the_closed_form(joints):
 
 @given(st.floats(0.5, 0.999), st.floats(-0.2, 0.2))
 def test_exact_search_meets_the_chord_and_agrees_with_scipy(share, tilt):
-    """Newton's method finds SciPy's root; the literal steps end within 0.01 rad and a few millimetres of it."""
+    """Newton's method finds SciPy's root; the literal steps end within 0.01 rad of it."""
     segments = np.array([[0.12, -0.02], [0.11, 0.02], [0.1, 0.03], [0.07, 0.02], [0.06, 0.03]])
     flat = segments @ np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
     length = float(np.linalg.norm(flat.sum(axis=0)))
@@ -121,7 +122,9 @@ def test_exact_search_meets_the_chord_and_agrees_with_scipy(share, tilt):
     assert met
     assert np.sqrt(flat_chord(MODEL.segments, flat, phi)[0]) == pytest.approx(wanted, abs=1e-9)
     step = 0.1 * np.sign(phi)
-    root = brentq(lambda p: flat_chord(MODEL.segments, flat, p)[0] - wanted**2, phi - step, phi + step, xtol=1e-13)
+    root = brentq(
+        lambda p: flat_chord(MODEL.segments, flat, p)[0] - wanted**2, phi - step, phi + step, xtol=1e-13
+    )
     assert phi == pytest.approx(root, abs=1e-6)
     literal, met = search_angle(MODEL.segments, flat, 0.0, wanted, True)
     assert met and abs(literal - phi) < 0.0101
@@ -193,7 +196,7 @@ def test_stretching_is_unique_monotone_and_ends_straight():
 @pytest.mark.parametrize("clavicles", [True, False])
 @pytest.mark.parametrize("spine", [1, 2, 3, 6, 12, 25])
 def test_any_number_of_spine_joints(spine, clavicles):
-    """Rigs with 1 to 25 spine joints, with or without clavicles, take the neutral pose and bend to the head."""
+    """Rigs with 1 to 25 spine joints, with or without clavicles, stand neutrally and bend to the head."""
     figure = sp.Figure.from_skeleton(rig(spine, clavicles))
     assert len(figure.roles.spine) == spine
     points = points_of(figure)
@@ -305,7 +308,13 @@ def test_align_pelvis_brings_the_axis_back():
 
 @pytest.mark.parametrize(
     "options",
-    [{"weights": (0, 0, 0)}, {"weights": (1, 1)}, {"weights": (1, -1, 0)}, {"search": "fast"}, {"clavicles": ""}],
+    [
+        {"weights": (0, 0, 0)},
+        {"weights": (1, 1)},
+        {"weights": (1, -1, 0)},
+        {"search": "fast"},
+        {"clavicles": ""},
+    ],
 )
 def test_impossible_options_are_refused(options):
     """A wrong option is an error when the solver is made."""

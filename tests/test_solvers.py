@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from independent import anatomical, limit_excess, world_matrices
 from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
+from independent import anatomical, limit_excess, world_matrices
 from sixpoint.body.dofs import Ball, Hinges
 
 FIGURE = sp.Figure.from_stature(1.75)
@@ -225,7 +225,7 @@ def test_a_lost_point_leaves_the_others_met(name, effector, clips):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_everything_lost_holds_the_pose(name, clips):
-    """With all points lost the figure stands still as it was; from the very first frame it stands neutrally."""
+    """With all points lost the figure stands still as it was; from the first frame, neutrally."""
     _, targets = clips["walk"]
     solver = sp.make_solver(name, FIGURE)
     seen = solver.solve(targets.positions[10])

@@ -240,9 +240,7 @@ class Figure:
             local = local.copy()
             local[:, self.extremities] = extras.rotations[:, self.extremities]
         moving, translations = self.place_pelvis(local, pelvis)
-        return Motion(
-            self.skeleton, local, translations, rate, moving=moving, name=name or self.name
-        )
+        return Motion(self.skeleton, local, translations, rate, moving=moving, name=name or self.name)
 
     def place_pelvis(self, local: Array, pelvis: Array) -> tuple[tuple[int, ...], Array]:
         """Which joints translate, and where to, so that the pelvis joint is at ``pelvis`` (F, 3) [m].

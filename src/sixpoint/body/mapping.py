@@ -34,7 +34,7 @@ def read_mapping(mapping: Mapping[str, str] | str | Path | None) -> dict[str, st
         raise FormatError(mapping, f"cannot be read: {error.strerror}") from error
     table = table.get("roles", table)
     if not isinstance(table, dict):
-        raise FormatError(mapping, "[roles] must be a table of role = \"joint name\"")
+        raise FormatError(mapping, '[roles] must be a table of role = "joint name"')
     wrong = [key for key, value in table.items() if not isinstance(value, str)]
     if wrong:
         raise FormatError(mapping, f"each role names one joint; not so at {', '.join(wrong)}")

@@ -163,9 +163,7 @@ def _assemble(skeleton: Skeleton, found: Mapping[str, int], by: str) -> Roles:
     return Roles(pelvis, spine, offset, clavicle, **pairs, found_by=by)
 
 
-def _find_clavicle(
-    skeleton: Skeleton, named: int | None, trunk: set[int], shoulder: int
-) -> tuple[int, ...]:
+def _find_clavicle(skeleton: Skeleton, named: int | None, trunk: set[int], shoulder: int) -> tuple[int, ...]:
     """The joint between trunk and shoulder: the named one, else the first that is not in the trunk."""
     path = skeleton.path(0, shoulder)
     below = max((k for k, joint in enumerate(path) if joint in trunk), default=-1) + 1

@@ -68,9 +68,7 @@ class Screen:
     @contextmanager
     def progress(self) -> Iterator[Report]:
         """A progress bar, shown on a terminal only; yields what jobs report to."""
-        columns = (
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        )
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         bar = Progress(*columns, console=self.err, transient=True, disable=not self.err.is_terminal)
         tasks: dict[str, TaskID] = {}
 

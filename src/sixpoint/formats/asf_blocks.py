@@ -131,9 +131,7 @@ def _keep_bone(path: Path, bones: dict[str, Block], block: Block) -> None:
     bones[block.name] = block
 
 
-def _read_hierarchy(
-    path: Path, entries: Sequence[Entry], bones: Sequence[Block]
-) -> dict[str, str]:
+def _read_hierarchy(path: Path, entries: Sequence[Entry], bones: Sequence[Block]) -> dict[str, str]:
     known = {"root", *(bone.name for bone in bones)}
     parents: dict[str, str] = {}
     for line, words in entries:

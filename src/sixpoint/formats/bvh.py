@@ -109,7 +109,9 @@ def _read_frames(path: Path, lines: Sequence[str], header: _Header, channels: in
         raise FormatError(
             path,
             f"fewer frames than declared in line {header.line}: the file is truncated; if these are all, "
-            f"write Frames: {len(rows)}" if rows else "the file holds no frames",
+            f"write Frames: {len(rows)}"
+            if rows
+            else "the file holds no frames",
             line=numbers[-1] + 1 if rows else header.line,
             expected=f"{header.frames} frames",
             got=f"{len(rows)}",

@@ -86,7 +86,9 @@ def compute_errors(figure: Figure, truth: Motion, result: Motion) -> Errors:
     if len(truth) != len(result):
         raise SkeletonError(f"truth has {len(truth)} frames, the result {len(result)}")
     joints = measured_joints(figure)
-    distances = np.linalg.norm(_positions(figure, truth, joints) - _positions(figure, result, joints), axis=-1)
+    distances = np.linalg.norm(
+        _positions(figure, truth, joints) - _positions(figure, result, joints), axis=-1
+    )
     turned = rot.mul(rot.inv(_rotations(figure, truth, joints)), _rotations(figure, result, joints))
     angles = rot.angle(turned)
     names = [figure.skeleton.names[j] for j in joints]

@@ -1,8 +1,8 @@
 """One frame of Sequential IK, in the order of the paper: pelvis, spine, legs, clavicles, arms.
 
 State between frames is one array (rows + 5, 4): ``local`` (rows, 4) are the anatomical local rotations of
-the posed joints and ``memory`` (5, 4) holds the estimated X axis, the bending plane's normal (zero if none), the positions of
-pelvis and head, and in its last row whether there was a frame before.
+the posed joints and ``memory`` (5, 4) holds the estimated X axis, the bending plane's normal (zero if none),
+the positions of pelvis and head, and in its last row whether there was a frame before.
 
 Reference: Unzueta et al. 2008, Algorithm 1.
 """
@@ -55,8 +55,23 @@ def fill_lost(points, filled, memory, neutral_chord):
 
 @helper
 def solve_trunk(
-    segments, turns, chords, balls, limits, literal, align, pelvis, head, x_estimated, y, local, memory,
-    world, segs, start, flat,
+    segments,
+    turns,
+    chords,
+    balls,
+    limits,
+    literal,
+    align,
+    pelvis,
+    head,
+    x_estimated,
+    y,
+    local,
+    memory,
+    world,
+    segs,
+    start,
+    flat,
 ):
     """Pelvis and spine (Algorithm 2); returns the pelvis joint's position. ``y`` is the chord's direction."""
     goal = vec.sub(head, pelvis)
@@ -64,7 +79,19 @@ def solve_trunk(
     # The trunk starts with the spine of the frame before and the pelvis as just estimated (Algorithm 1).
     qt.store(local, 0, qt.from_axes(x_estimated, y, vec.cross(x_estimated, y)))
     v = spine.set_chord(
-        segments, turns, chords, balls, limits, literal, wanted, goal, local, world, segs, start, flat,
+        segments,
+        turns,
+        chords,
+        balls,
+        limits,
+        literal,
+        wanted,
+        goal,
+        local,
+        world,
+        segs,
+        start,
+        flat,
         vec.load(memory, 1),
     )
     vec.store(memory, 1, v)
@@ -92,7 +119,14 @@ def pose_limb(limbs, balls, limits, limb, row, h, parent, place, target, local):
     """Pose one limb whose root joint has the given row; returns its end's position."""
     root, hinge, end = solve_limb(
         qt.inv_mul_vec(parent, vec.sub(target, place)),
-        limbs[limb, 0], limbs[limb, 1], h, limits, balls, row, limbs[limb, 2], limbs[limb, 3],
+        limbs[limb, 0],
+        limbs[limb, 1],
+        h,
+        limits,
+        balls,
+        row,
+        limbs[limb, 2],
+        limbs[limb, 3],
     )
     qt.store(local, row, root)
     qt.store(local, row + 2, hinge)
@@ -100,9 +134,7 @@ def pose_limb(limbs, balls, limits, limb, row, h, parent, place, target, local):
 
 
 @helper
-def pose_arm(
-    chest, girdle, clavicles, limbs, balls, limits, hold, side, root, target, world, segs, local
-):
+def pose_arm(chest, girdle, clavicles, limbs, balls, limits, hold, side, root, target, world, segs, local):
     """Clavicle and arm of one side; returns the wrist's position."""
     row = segs.shape[0] + side
     place = root
@@ -114,7 +146,10 @@ def pose_arm(
         qt.load(local, row) if hold else qt.IDENTITY,
         vec.load(clavicles, side),
         qt.inv_mul_vec(frame, vec.sub(target, joint)),
-        limbs[side, 0] + limbs[side, 1], limits, balls, row,
+        limbs[side, 0] + limbs[side, 1],
+        limits,
+        balls,
+        row,
     )
     qt.store(local, row, clavicle)
     frame = qt.mul(frame, clavicle)
@@ -137,13 +172,25 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
     if vec.norm(y) < 0.5:  # pelvis and head coincide: the trunk keeps its direction
         y = vec.unit(vec.sub(vec.load(memory, 3), vec.load(memory, 2)))
         y = y if vec.norm(y) > 0.5 else (0.0, 1.0, 0.0)
-    x = estimate_x(
-        filled, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3
-    )
+    x = estimate_x(filled, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3)
     root = solve_trunk(
-        model.segments, model.turns, model.chords, model.balls,
-        settings.limits, settings.literal, settings.align_pelvis,
-        pelvis, head, x, y, local, memory, world, segs, start, flat,
+        model.segments,
+        model.turns,
+        model.chords,
+        model.balls,
+        settings.limits,
+        settings.literal,
+        settings.align_pelvis,
+        pelvis,
+        head,
+        x,
+        y,
+        local,
+        memory,
+        world,
+        segs,
+        start,
+        flat,
     )
     top = vec.add(root, spine.chord_of(segs))
     vec.store(memory, 0, x)
@@ -162,13 +209,32 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
             frame = qt.load(world, 0)
             place = vec.add(root, qt.mul_vec(frame, vec.load(model.hips, side)))
             end = pose_limb(
-                model.limbs, model.balls, settings.limits, 2 + side, count + 6 + side, 1.0,
-                frame, place, target, local,
+                model.limbs,
+                model.balls,
+                settings.limits,
+                2 + side,
+                count + 6 + side,
+                1.0,
+                frame,
+                place,
+                target,
+                local,
             )
         else:
             end = pose_arm(
-                model.chest, model.girdle, model.clavicles, model.limbs, model.balls,
-                settings.limits, settings.hold_clavicles, side, root, target, world, segs, local,
+                model.chest,
+                model.girdle,
+                model.clavicles,
+                model.limbs,
+                model.balls,
+                settings.limits,
+                settings.hold_clavicles,
+                side,
+                root,
+                target,
+                world,
+                segs,
+                local,
             )
         residual[effector] = vec.norm(vec.sub(target, end))
     if lost:
@@ -194,7 +260,9 @@ def write_rig(row, before, after, constant, origin, local, root, rotations, pelv
 
 
 @entry
-def solve_frames(table, integers, balls, chords, options, points, state, work, rotations, pelvis, status, residual):
+def solve_frames(
+    table, integers, balls, chords, options, points, state, work, rotations, pelvis, status, residual
+):
     """Solve F frames in order.
 
     Few arrays are passed, because unpacking each of them would cost more than a tenth of a frame.
@@ -222,6 +290,13 @@ def solve_frames(table, integers, balls, chords, options, points, state, work, r
     for f in range(points.shape[0]):
         status[f] = solve_frame(model, settings, points[f], local, memory, residual[f], scratch)
         write_rig(
-            model.row, model.before, model.after, model.constant, model.origin, local,
-            vec.load(memory, 2), rotations[f], pelvis[f],
+            model.row,
+            model.before,
+            model.after,
+            model.constant,
+            model.origin,
+            local,
+            vec.load(memory, 2),
+            rotations[f],
+            pelvis[f],
         )

@@ -126,7 +126,13 @@ def unpack_model(table, integers, balls, chords):
 def unpack_settings(options):
     """Settings from seven numbers."""
     return Settings(
-        options[0], options[1], options[2], options[3] > 0.0, options[4] > 0.0, options[5] > 0.0, options[6] > 0.0
+        options[0],
+        options[1],
+        options[2],
+        options[3] > 0.0,
+        options[4] > 0.0,
+        options[5] > 0.0,
+        options[6] > 0.0,
     )
 
 

@@ -7,7 +7,7 @@ Kinematics", Graphical Models 70 (2008) 87-104.
 from __future__ import annotations
 
 import logging
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +80,8 @@ class SequentialIK:
             "align_pelvis": bool(align_pelvis),
         }
         model = build_model(figure)
-        self._arrays = (*pack_model(model), model.balls, model.chords)
+        table, integers = pack_model(model)
+        self._arrays: tuple[Any, Any, Any, Any] = (table, integers, model.balls, model.chords)
         self._work = (work_rows(len(model.segments)), 4)
         self._start = np.zeros((len(model.segments) + LIMB_ROWS + MEMORY_ROWS, 4))
         self._start[:-MEMORY_ROWS] = rot.IDENTITY
@@ -99,8 +100,15 @@ class SequentialIK:
         rotations, pelvis = np.empty((1, len(self.figure.skeleton), 4)), np.empty((1, 3))
         status, residual = np.empty(1, np.int64), np.empty((1, 6))
         solve_frames(
-            *self._arrays, self._settings(dt), frame[None], state, np.empty(self._work),
-            rotations, pelvis, status, residual,
+            *self._arrays,
+            self._settings(dt),
+            frame[None],
+            state,
+            np.empty(self._work),
+            rotations,
+            pelvis,
+            status,
+            residual,
         )
         moving, translations = self._place(pelvis)
         pose = Pose(self.figure.skeleton, rotations[0], translations[0], moving)
@@ -123,8 +131,15 @@ class SequentialIK:
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             solve_frames(
-                *self._arrays, options, points[part], state, work,
-                rotations[part], pelvis[part], status[part], residual[part],
+                *self._arrays,
+                options,
+                points[part],
+                state,
+                work,
+                rotations[part],
+                pelvis[part],
+                status[part],
+                residual[part],
             )
             if progress:
                 progress(part.stop)

@@ -1,25 +1,18 @@
 """Step 2: bend or stretch the trunk between pelvis and head (Unzueta et al. 2008, Algorithms 2 and 3).
 
-All trunk segments turn about one world axis v by shares of the pelvis' angle phi (eq. 1), so the chord
-pelvis-head is a sum of plane rotations: the search for the chord length costs a few multiplications a step.
-
 Scratch arrays: ``world`` (S, 4) are the world rotations of the trunk joints, ``segs`` (S, 4) the segment
-vectors in the world (columns 0 to 2); both are updated in place. ``local`` rows 1 to S - 1 are the interior joints.
+vectors in the world (columns 0 to 2); both are updated in place. ``local`` rows 1 to S - 1 are the interior
+joints. The angle to bend by is found in ``bending.py``.
 """
-
-from math import cos, sin, sqrt
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import clamp
+from sixpoint.solvers.sequential.bending import COARSE, COARSE_CAP, STALL, plane_components, search_angle
 
-COARSE, FINE = 0.1, 0.01  # rad, Algorithm 3
-COARSE_CAP, FINE_CAP = 40, 20
-STALL = 1e-5  # m, a coarse step that changes the chord by less leads nowhere
 STRAIGHT = 1e-3  # rad, a trunk bent by less has no plane
 ALIGNED = 1e-3  # sine of the angle below which two chords span no plane
-EXACT = 1e-10  # m
 
 
 @helper
@@ -76,106 +69,6 @@ def bending_axis(chord, wanted, local, world, plane):
     else:
         v = qt.x_axis(qt.load(world, 0))
     return vec.scale(-1.0, v) if vec.dot(bent, v) < 0.0 else v
-
-
-@helper
-def plane_components(segs, v, flat):
-    """Write the parts of the segments across v into flat (S, 2); return the length along v."""
-    helper_axis = (1.0, 0.0, 0.0) if abs(v[0]) < 0.7 else (0.0, 1.0, 0.0)
-    e1 = vec.unit(vec.cross(v, helper_axis))
-    e2 = vec.cross(v, e1)
-    along = 0.0
-    for k in range(segs.shape[0]):
-        s = vec.load(segs, k)
-        along += vec.dot(s, v)
-        flat[k, 0] = vec.dot(s, e1)
-        flat[k, 1] = vec.dot(s, e2)
-    return along
-
-
-@helper
-def flat_chord(segments, flat, phi):
-    """Chord across v after turning by phi: length squared and half its derivative."""
-    x, y, dx, dy = 0.0, 0.0, 0.0, 0.0
-    for k in range(flat.shape[0]):
-        share = segments[k, 3]
-        c, s = cos(share * phi), sin(share * phi)
-        px = c * flat[k, 0] - s * flat[k, 1]
-        py = s * flat[k, 0] + c * flat[k, 1]
-        x += px
-        y += py
-        dx -= share * py
-        dy += share * px
-    return x * x + y * y, x * dx + y * dy
-
-
-@helper
-def search_angle(segments, flat, along, wanted, literal):
-    """Angle phi of the pelvis for which the chord has the wanted length (Algorithm 3).
-
-    Coarse steps of 0.1 rad until the length is passed, then either fine steps of 0.01 rad back
-    (``literal``) or Newton's method inside the last coarse step, which meets the length exactly.
-
-    Returns:
-        phi [rad] and whether the length was met; if not, phi is the best found.
-    """
-    squared = flat_chord(segments, flat, 0.0)[0]
-    goal = wanted * wanted - along * along
-    sign = 1.0 if squared > goal else -1.0
-    length = sqrt(squared + along * along)
-    step, phi, steps = -sign, 0.0, 0
-    flipped = False
-    best_phi, best_gap = 0.0, abs(length - wanted)
-    passed = abs(length - wanted) < EXACT
-    while not passed and steps < COARSE_CAP:
-        phi += step * COARSE
-        steps += 1
-        squared = flat_chord(segments, flat, phi)[0]
-        before, length = length, sqrt(squared + along * along)
-        passed = sign * squared <= sign * goal
-        gap = abs(length - wanted)
-        if passed:
-            break
-        if gap < best_gap:
-            best_phi, best_gap = phi, gap
-        elif steps == 1 and not flipped:
-            flipped, step, phi, steps = True, sign, 0.0, 0
-            length = before
-        else:
-            return best_phi, False
-        if abs(length - before) < STALL and steps > 0:
-            return best_phi, False
-    if not passed:
-        return best_phi, False
-    if phi == 0.0:
-        return phi, True
-    if literal:
-        for _ in range(FINE_CAP):
-            phi -= step * FINE
-            if sign * flat_chord(segments, flat, phi)[0] >= sign * goal:
-                break
-        return phi, True
-    return _refine(segments, flat, goal, phi - step * COARSE, phi, along), True
-
-
-@helper
-def _refine(segments, flat, goal, inside, outside, along):
-    """Newton's method kept inside the bracket; f = chord squared minus goal."""
-    f_inside = flat_chord(segments, flat, inside)[0] - goal
-    phi = outside
-    tolerance = 2.0 * sqrt(max(goal + along * along, 1e-12)) * EXACT
-    for _ in range(40):
-        squared, slope = flat_chord(segments, flat, phi)
-        f = squared - goal
-        if abs(f) < tolerance:
-            break
-        if (f > 0.0) == (f_inside > 0.0):
-            inside, f_inside = phi, f
-        else:
-            outside = phi
-        newton = phi - f / (2.0 * slope) if slope != 0.0 else outside
-        phi = newton if (newton - inside) * (newton - outside) < 0.0 else 0.5 * (inside + outside)
-    return phi
 
 
 @helper

@@ -1,0 +1,63 @@
+"""What the README shows is run: every Python block, every command."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import sixpoint as sp
+from sixpoint.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_python_blocks_run(tmp_path, monkeypatch, capsys):
+    """The Python of the README runs as it stands, in order."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    assert len(blocks("python")) >= 2
+    for block in blocks("python"):
+        exec(compile(block, "README.md", "exec"), names)
+    assert (tmp_path / "boxing.bvh").exists()
+    assert 0.01 < float(capsys.readouterr().out) < 0.03
+
+
+COMMANDS = [
+    line.split("#")[0].strip()
+    for block in blocks("")
+    for line in block.splitlines()
+    if line.startswith("sixpoint ") and "demo" not in line
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_run(command, tmp_path, monkeypatch, capsys):
+    """The commands of the README succeed with files of the names they use."""
+    monkeypatch.chdir(tmp_path)
+    figure = sp.Figure.from_stature(1.75)
+    motion = sp.make_sample("walk", figure).sliced(slice(0, 40))
+    sp.save(motion, "walk.bvh")
+    sp.save(motion, "take.amc")
+    sp.save(motion, "17_10.amc")
+    sp.save_targets(figure.targets(motion), "points.csv")
+    if "convert" not in command:
+        sp.save(motion, "take.bvh")
+    with pytest.raises(SystemExit) as exit_:
+        raise SystemExit(main(shlex.split(command)[1:]))
+    assert not exit_.value.code
+
+
+def test_links_lead_somewhere():
+    """Every relative link of the README and the docs names a file that exists."""
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text("utf-8")):
+            if not target.startswith("http"):
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
