@@ -284,6 +284,10 @@ def test_wrong_constructions_say_what_would_work(name):
         solver.solve(np.zeros((5, 3)))
     with pytest.raises(sp.SixpointError, match="seconds"):
         solver.solve(points_of(FIGURE), dt=0.0)
+    other = sp.Figure.from_skeleton(FIGURE.skeleton, {"head": "vt1"})
+    stranger = sp.make_solver(name, other).solve(points_of(other))
+    with pytest.raises(sp.SixpointError, match="previous"):
+        solver.solve(points_of(FIGURE), previous=stranger)
     with pytest.raises(sp.SixpointError, match="sik"):
         sp.make_solver("no such method", FIGURE)
 

@@ -94,9 +94,13 @@ class SequentialIK:
             points: (6, 3) positions of the effectors in the order of ``EFFECTORS`` [m]; NaN where lost.
             previous: The solution of the frame before, if any.
             dt: Time since that frame [s].
+
+        Raises:
+            TargetError: ``points`` has another shape.
+            SixpointError: ``previous`` is of another figure, or ``dt`` is not positive.
         """
         frame = as_points(points)
-        state = (self._start if previous is None else previous.state[0]).copy()
+        state = self._state_after(previous)
         rotations, pelvis = np.empty((1, len(self.figure.skeleton), 4)), np.empty((1, 3))
         status, residual = np.empty(1, np.int64), np.empty((1, 6))
         solve_frames(
@@ -163,6 +167,13 @@ class SequentialIK:
         points = rest[[r.pelvis, r.head, *r.wrist, *r.ankle]]
         points[1] += self.figure.head_offset
         self.solve(points)
+
+    def _state_after(self, previous: Solution | None) -> Array:
+        if previous is None:
+            return self._start.copy()
+        if len(previous.state) != 1 or previous.state[0].shape != self._start.shape:
+            raise SixpointError("previous is not a solution of this solver's figure; begin with previous=None")
+        return previous.state[0].copy()
 
     def _settings(self, dt: float) -> Array:
         """Options for a frame time as seven numbers; the last ones asked for are kept."""
