@@ -7,15 +7,14 @@ Reference: H-Anim (ISO/IEC 19774); Unzueta et al. 2008, section 9; numbers in ``
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.tables import read_shipped
 from sixpoint.errors import FigureError, listed
 
 MEAN_STATURE = 1.75
@@ -23,8 +22,7 @@ MEAN_STATURE = 1.75
 
 @cache
 def _proportions() -> dict[str, Any]:
-    text = resources.files("sixpoint.body").joinpath("data/proportions.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    return read_shipped("proportions.toml")
 
 
 def segments_of_stature(stature: float) -> dict[str, float]:

@@ -5,10 +5,8 @@ Reference: Unzueta et al. 2008, section 7; the sources of the numbers are in ``d
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
+from sixpoint.body.tables import read_shipped, read_table
 from sixpoint.errors import FormatError
 
 Array = NDArray[np.float64]
@@ -38,19 +37,12 @@ class Limits:
     @classmethod
     def default(cls) -> Limits:
         """The table that ships with sixpoint."""
-        text = resources.files("sixpoint.body").joinpath("data/joint_limits.toml").read_text("utf-8")
-        return cls(tomllib.loads(text))
+        return cls(read_shipped("joint_limits.toml"))
 
     @classmethod
     def load(cls, path: str | Path) -> Limits:
         """A user's own table; every entry must be there and make sense."""
-        try:
-            table = tomllib.loads(Path(path).read_text("utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise FormatError(path, f"not a TOML file: {error}") from error
-        except OSError as error:
-            raise FormatError(path, f"cannot be read: {error.strerror}") from error
-        limits = cls(table, str(path))
+        limits = cls(read_table(path), str(path))
         try:
             limits.check()
         except KeyError as error:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from sixpoint.body.tables import read_table
 from sixpoint.errors import FigureError, FormatError
 
 
@@ -26,12 +26,7 @@ def read_mapping(mapping: Mapping[str, str] | str | Path | None) -> dict[str, st
         if wrong:
             raise FigureError(f"each role names one joint; not so at {', '.join(wrong)}")
         return dict(mapping)
-    try:
-        table = tomllib.loads(Path(mapping).read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FormatError(mapping, f"not a TOML file: {error}") from error
-    except OSError as error:
-        raise FormatError(mapping, f"cannot be read: {error.strerror}") from error
+    table = read_table(mapping)
     table = table.get("roles", table)
     if not isinstance(table, dict):
         raise FormatError(mapping, '[roles] must be a table of role = "joint name"')

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import resources
 from itertools import pairwise
 from typing import Any
 
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.tables import read_shipped
 
 SIDES = ("l", "r")
 DIGITS = "0123456789"
@@ -21,8 +20,7 @@ Named = dict[tuple[str, str], int]
 
 @cache
 def _tables() -> dict[str, Any]:
-    text = resources.files("sixpoint.body").joinpath("data/rig_names.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    return read_shipped("rig_names.toml")
 
 
 @cache

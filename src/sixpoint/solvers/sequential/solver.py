@@ -172,7 +172,7 @@ class SequentialIK:
         if previous is None:
             return self._start.copy()
         if len(previous.state) != 1 or previous.state[0].shape != self._start.shape:
-            raise SixpointError("previous is not a solution of this solver's figure; begin with previous=None")
+            raise SixpointError("previous is of another figure; begin with previous=None")
         return previous.state[0].copy()
 
     def _settings(self, dt: float) -> Array:
