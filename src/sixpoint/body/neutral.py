@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
 SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be that axis
+GUIDE = np.radians(40.0)  # the first trunk bone tells the pelvis' up only if it is this near to the posture's
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
 STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
 
@@ -120,7 +121,12 @@ def _trunk_from_motion(skeleton: Skeleton, roles: Roles, local: Array) -> Array:
     positions, world = skeleton.compute_transforms(local)
     hips = positions[list(roles.hip)]
     left = rot.unit(hips[0] - hips[1])
-    bone = _trunk_bone(roles, positions, world, 0)
+    head = positions[roles.head] + rot.mul_vec(world[roles.head], roles.head_offset)
+    legs = rot.unit(positions[list(roles.ankle)] - hips).sum(axis=0)
+    posture = rot.unit(rot.unit(head - positions[roles.pelvis]) - rot.unit(legs))
+    bone = rot.unit(_trunk_bone(roles, positions, world, 0))
+    if bone @ posture < np.cos(GUIDE):  # a helper bone that does not point up the trunk
+        bone = posture
     up = rot.unit(bone - (bone @ left) * left)
     if not (left.any() and up.any()):
         raise FigureError("hips or spine have no extent: the pelvis' axes cannot be found")

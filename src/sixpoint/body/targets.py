@@ -68,7 +68,10 @@ class Targets:
 
 def as_points(points: ArrayLike) -> Array:
     """One frame of effector positions as a new C-contiguous (6, 3) array [m]."""
-    array = np.array(points, dtype=np.float64, order="C")
+    try:
+        array = np.array(points, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise TargetError(f"points must be numbers (6, 3), NaN where one is lost: {error}") from error
     if array.shape != (6, 3):
         raise TargetError(f"points must be (6, 3), one row per effector {EFFECTORS}, got {array.shape}")
     return array

@@ -2,7 +2,8 @@
 
 State between frames is one array (rows + 5, 4): ``local`` (rows, 4) are the anatomical local rotations of
 the posed joints and ``memory`` (5, 4) holds the estimated X axis, the bending plane's normal (zero if none),
-the positions of pelvis and head, and in its last row whether there was a frame before.
+the positions of pelvis and head, and in its last row whether there was a frame before and whether
+the X axis was ever told by wrists or ankles.
 
 Reference: Unzueta et al. 2008, Algorithm 1.
 """
@@ -16,7 +17,7 @@ from sixpoint.solvers.sequential import spine
 from sixpoint.solvers.sequential.clavicle import solve_clavicle
 from sixpoint.solvers.sequential.limb import solve_limb
 from sixpoint.solvers.sequential.packing import unpack_model, unpack_settings, unpack_work
-from sixpoint.solvers.sequential.pelvis import estimate_x
+from sixpoint.solvers.sequential.pelvis import estimate_x, says_something
 
 MEMORY_ROWS = 5
 FAR = 1e7  # m, a point farther away than this, or not a number, counts as lost
@@ -172,7 +173,7 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
     if vec.norm(y) < 0.5:  # pelvis and head coincide: the trunk keeps its direction
         y = vec.unit(vec.sub(vec.load(memory, 3), vec.load(memory, 2)))
         y = y if vec.norm(y) > 0.5 else (0.0, 1.0, 0.0)
-    x = estimate_x(filled, y, vec.load(memory, 0), memory[4, 0] > 0.0, settings.w1, settings.w2, settings.w3)
+    x = estimate_x(filled, y, vec.load(memory, 0), memory[4, 1] > 0.0, settings.w1, settings.w2, settings.w3)
     root = solve_trunk(
         model.segments,
         model.turns,
@@ -193,7 +194,9 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
         flat,
     )
     top = vec.add(root, spine.chord_of(segs))
-    vec.store(memory, 0, x)
+    if memory[4, 1] > 0.0 or says_something(filled, y):
+        vec.store(memory, 0, x)
+        memory[4, 1] = 1.0
     vec.store(memory, 2, root)
     vec.store(memory, 3, top)
     memory[4, 0] = 1.0

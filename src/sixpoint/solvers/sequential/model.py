@@ -69,7 +69,8 @@ def _limb(figure: Figure, chain: tuple[int, int, int]) -> list[float]:
     root, middle, end = chain
     dof = figure.dofs[middle]
     assert isinstance(dof, Hinges)
-    flexion = sorted((abs(float(dof.lower[0])), abs(float(dof.upper[0]))))
+    low, high = float(dof.lower[0]), float(dof.upper[0])
+    flexion = [low, high] if middle in figure.roles.knee else [-high, -low]
     upper = np.linalg.norm(figure.offset_between(root, middle))
     return [float(upper), float(np.linalg.norm(figure.offset_between(middle, end))), *flexion]
 

@@ -25,6 +25,12 @@ def across(points, left, right, y):
 
 
 @helper
+def says_something(points, y):
+    """Whether wrists or ankles tell the pelvis' X axis."""
+    return vec.norm(across(points, 2, 3, y)) + vec.norm(across(points, 4, 5, y)) > 0.0
+
+
+@helper
 def estimate_x(points, y, x_previous, has_previous, w1, w2, w3):
     """X axis of the pelvis, a unit vector perpendicular to y.
 
@@ -43,7 +49,7 @@ def estimate_x(points, y, x_previous, has_previous, w1, w2, w3):
         return vec.unit(total)
     if vec.norm(before) > 0.5:
         return before
-    # Nothing known: the world's X, or its Z where Y lies along X.
+    # Nothing known: the world's X, or its -Z where Y lies along X.
     x = vec.reject((1.0, 0.0, 0.0), y)
     if vec.norm(x) < sqrt(0.5):
         x = vec.reject((0.0, 0.0, -1.0), y)

@@ -73,6 +73,8 @@ class SequentialIK:
             raise SixpointError(f"clavicles is 'neutral' or 'hold', got {clavicles!r}")
         self.figure = figure
         self.weights = (float(weights[0]), float(weights[1]), float(weights[2]))
+        if max(self.weights) > 1e6 or (0 < max(self.weights) < 1e-6):
+            raise SixpointError(f"weights are compared with each other: numbers around 1, got {weights}")
         self._options = {
             "limits": bool(limits),
             "literal": search == "literal",
@@ -93,11 +95,11 @@ class SequentialIK:
         Args:
             points: (6, 3) positions of the effectors in the order of ``EFFECTORS`` [m]; NaN where lost.
             previous: The solution of the frame before, if any.
-            dt: Time since that frame [s].
+            dt: Time since that frame [s]; zero or less counts as no time.
 
         Raises:
             TargetError: ``points`` has another shape.
-            SixpointError: ``previous`` is of another figure, or ``dt`` is not positive.
+            SixpointError: ``previous`` is of another figure.
         """
         frame = as_points(points)
         state = self._state_after(previous)
@@ -171,7 +173,7 @@ class SequentialIK:
     def _state_after(self, previous: Solution | None) -> Array:
         if previous is None:
             return self._start.copy()
-        if len(previous.state) != 1 or previous.state[0].shape != self._start.shape:
+        if previous.pose.skeleton is not self.figure.skeleton or previous.state[0].shape != self._start.shape:
             raise SixpointError("previous is of another figure; begin with previous=None")
         return previous.state[0].copy()
 
@@ -200,15 +202,15 @@ def weights_at_rate(weights: tuple[float, float, float], dt: float) -> tuple[flo
     The share of new information per frame is b = (w1 + w2) / (w1 + w2 + w3); over equal times the same
     forgetting needs b' = 1 - (1 - b)^(120 dt). The ratio of w1 to w2 stays.
 
-    Raises:
-        SixpointError: ``dt`` is not a positive number.
+    Where no time passed (two packets of one instant; also a negative or unknown ``dt``) nothing new is known:
+    the pelvis keeps its axis if it has a memory at all.
     """
-    if not (np.isfinite(dt) and dt > 0):
-        raise SixpointError(f"dt is the time since the last frame in seconds, above zero; got {dt}")
+    if not dt > 0:
+        dt = 0.0
     w1, w2, w3 = weights
     new = w1 + w2
     if w3 <= 0.0 or new <= 0.0:
         return weights
-    kept = (w3 / (new + w3)) ** (120.0 * dt)
+    kept = (w3 / (new + w3)) ** (120.0 * min(dt, 1e3))
     scale = w3 * (1.0 - kept) / kept / new if kept > 1e-12 else 1e12
     return w1 * scale, w2 * scale, w3
