@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +20,7 @@ from sixpoint.solvers.sequential.limb import solve_limb
 from sixpoint.solvers.sequential.model import build_model
 from sixpoint.solvers.sequential.pelvis import estimate_x
 from sixpoint.solvers.sequential.solver import weights_at_rate
-from sixpoint.solvers.sequential.spine import chord_of, place_trunk, stretch
+from sixpoint.solvers.sequential.spine import bending_axis, chord_of, place_trunk, stretch
 from test_solvers import FIGURE, as_motion, points_of
 
 MODEL = build_model(FIGURE)
@@ -320,3 +322,51 @@ def test_impossible_options_are_refused(options):
     """A wrong option is an error when the solver is made."""
     with pytest.raises(sp.SixpointError):
         sp.SequentialIK(FIGURE, **options)
+
+
+@pytest.mark.parametrize("blind", [[0, 1, 2, 3, 4, 5], [2, 3, 4, 5], [2, 3, 4]])
+def test_a_blind_start_decides_nothing(blind):
+    """Frames that do not tell the yaw do not weigh in once it is told: no spin when the trackers come up."""
+    targets = FIGURE.targets(sp.make_sample("walk", FIGURE).sliced(slice(0, 20)))
+    positions = targets.positions @ np.diag([-1.0, 1.0, -1.0])  # facing the other way
+    solver = sp.SequentialIK(FIGURE)
+    first = np.array(positions[0])
+    first[blind] = np.nan
+    late = solver.solve(positions[1], previous=solver.solve(first))
+    fresh = solver.solve(positions[1])
+    turned = [Rotation.from_quat(s.pose.rotations[0]).as_matrix() for s in (late, fresh)]
+    np.testing.assert_allclose(turned[0], turned[1], atol=1e-6)
+
+
+def test_the_memory_begins_with_both_lines_alike():
+    """With a memory, the first frame weighs wrists and ankles the same, whatever w1 and w2."""
+    points = points_of(FIGURE)
+    points[2:4] = points[2:4] @ Rotation.from_rotvec([0, 0.6, 0]).as_matrix().T
+    y = (0.0, 1.0, 0.0)
+    axes = [
+        estimate_x(known(points), y, (0.0, 0.0, 0.0), False, *w) for w in ((0.1, 0.9, 1.0), (0.5, 0.5, 1.0))
+    ]
+    np.testing.assert_allclose(axes[0], axes[1])
+    assert not np.allclose(axes[0], estimate_x(known(points), y, (0.0, 0.0, 0.0), False, 0.1, 0.9, 0.0))
+
+
+def test_parallel_chords_keep_the_previous_plane():
+    """A bent trunk whose chord is already along the target stays in the plane it was bent in."""
+    local = np.tile([0.0, 0, 0, 1], (len(MODEL.segments), 1))
+    local[1] = Rotation.from_rotvec([0.1, 0.0, 0.05]).as_quat()
+    world, segs = np.empty((len(local), 4)), np.empty((len(local), 4))
+    place_trunk(MODEL.segments, local, world, segs)
+    chord, plane = chord_of(segs), tuple(np.array([0.8, 0.0, 0.6]))
+    assert bending_axis(chord, chord, local, world, plane) == plane
+
+
+def test_a_knee_may_hyperextend_where_the_table_says_so():
+    """A negative least flexion is the hinge's range as it is, on both sides; the neutral pose stays neutral."""
+    table = tomllib.loads(sp.Limits.text())
+    table["knee"]["flexion"] = [-10, 150]
+    table["elbow"]["flexion"] = [-5, 140]
+    figure = FIGURE.with_limits(sp.Limits(table))
+    limbs = np.degrees(build_model(figure).limbs[:, 2:])
+    np.testing.assert_allclose(limbs, [[-5, 140], [-5, 140], [-10, 150], [-10, 150]])
+    solution = sp.SequentialIK(figure).solve(points_of(figure))
+    np.testing.assert_allclose(solution.residual, 0.0, atol=1e-9)

@@ -282,14 +282,25 @@ def test_wrong_constructions_say_what_would_work(name):
     solver = sp.make_solver(name, FIGURE)
     with pytest.raises(sp.TargetError, match=r"\(6, 3\)"):
         solver.solve(np.zeros((5, 3)))
-    with pytest.raises(sp.SixpointError, match="seconds"):
-        solver.solve(points_of(FIGURE), dt=0.0)
-    other = sp.Figure.from_skeleton(FIGURE.skeleton, {"head": "vt1"})
+    with pytest.raises(sp.TargetError, match="NaN"):
+        solver.solve([None, "x"])
+    other = sp.Figure.from_stature(1.2)
     stranger = sp.make_solver(name, other).solve(points_of(other))
     with pytest.raises(sp.SixpointError, match="previous"):
         solver.solve(points_of(FIGURE), previous=stranger)
     with pytest.raises(sp.SixpointError, match="sik"):
         sp.make_solver("no such method", FIGURE)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf, 1e-9, 1e9])
+def test_any_time_step_is_survived(name, dt, clips):
+    """Two packets of one instant, a clock set back or a long pause give a finite pose."""
+    _, targets = clips["walk"]
+    solver = sp.make_solver(name, FIGURE)
+    first = solver.solve(targets.positions[0])
+    solution = solver.solve(targets.positions[1], previous=first, dt=dt)
+    assert np.isfinite(solution.pose.rotations).all() and solution.residual.max() < 0.1
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -54,10 +54,10 @@ class SwingTwist:
             raise FigureError("a swing limit needs at least three knots with increasing theta")
         if not np.allclose([theta[0], theta[-1], psi[0]], [-np.pi, np.pi, psi[-1]]):
             raise FigureError("swing knots must run from -180 to 180 degrees and end as they begin")
-        if np.any(psi < 0) or np.any(psi > np.pi):
+        if not (np.all(psi >= 0) and np.all(psi <= np.pi)):
             raise FigureError("swing limits must lie between 0 and 180 degrees")
-        if not self.twist[0] <= 0 <= self.twist[1]:
-            raise FigureError("the twist range must contain the neutral pose (0 degrees)")
+        if not -np.pi <= self.twist[0] <= 0 <= self.twist[1] <= np.pi:
+            raise FigureError("the twist range must contain the neutral pose and lie in -180 to 180 degrees")
 
     @cached_property
     def cubics(self) -> Array:
@@ -116,7 +116,7 @@ class Hinges:
             raise FigureError(f"a joint has one to three hinges, got {self.size}")
         if self.lower.shape != (self.size,) or self.upper.shape != (self.size,):
             raise FigureError("each hinge needs a lower and an upper limit")
-        if np.any(self.lower > self.upper):
+        if not np.all(self.lower <= self.upper):
             raise FigureError("a hinge's lower limit is above its upper limit")
         if not np.allclose(np.linalg.norm(self.axes, axis=1), 1.0, atol=1e-6):
             raise FigureError("hinge axes must have unit length")

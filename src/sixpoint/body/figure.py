@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 __all__ = ["COINCIDENT", "Figure", "SpineChain"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Figure:
     """A skeleton with anatomy.
 
@@ -55,6 +55,9 @@ class Figure:
     neutral: Array
     dofs: Dofs
     name: str = "figure"
+
+    def __repr__(self) -> str:
+        return f"Figure({self.name!r}, {len(self.skeleton)} joints, height {self.height:.3f} m)"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "neutral", frozen(self.neutral))

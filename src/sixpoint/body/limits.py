@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
-from sixpoint.body.tables import read_shipped, read_table
+from sixpoint.body.tables import read_shipped, read_table, shipped_text
 from sixpoint.errors import FormatError
 
 Array = NDArray[np.float64]
@@ -39,6 +39,11 @@ class Limits:
         """The table that ships with sixpoint."""
         return cls(read_shipped("joint_limits.toml"))
 
+    @staticmethod
+    def text() -> str:
+        """The table that ships with sixpoint as TOML, to copy and edit."""
+        return shipped_text("joint_limits.toml")
+
     @classmethod
     def load(cls, path: str | Path) -> Limits:
         """A user's own table; every entry must be there and make sense."""
@@ -60,8 +65,13 @@ class Limits:
             self.shoulder(side)
             self.hip(side)
             self.clavicle(side * X, side)
-        self.elbow()
-        self.knee()
+        for hinge in (self.elbow(), self.knee()):
+            if not -np.pi <= hinge.lower[0] <= hinge.upper[0] <= np.pi:
+                raise ValueError("flexion is two numbers between -180 and 180 degrees, the smaller first")
+        for region in ("lumbar", "thoracic", "cervical"):
+            ranges = np.asarray(self.table["spine"][region], float)
+            if ranges.shape != (4,) or not np.all((ranges >= 0) & (ranges <= 180)):
+                raise ValueError(f"[spine] {region} is four numbers between 0 and 180 degrees")
         self.spine([0.0, 1.0])
 
     def shoulder(self, side: float) -> Ball:

@@ -29,6 +29,7 @@ class FileSpace:
         unit: Metres per file unit.
         up: Axis of the file's world that points up, ``"y"`` or ``"z"``.
         unit_source: Where the unit comes from ("file", "guessed", "given").
+        order: Euler order of the file's angles, for formats that leave it open.
         up_source: Where the up axis comes from ("convention", "guessed", "given").
     """
 
@@ -36,9 +37,10 @@ class FileSpace:
     up: str = "y"
     unit_source: str = "convention"
     up_source: str = "convention"
+    order: str = "ZYX"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pose:
     """One posture of a skeleton.
 
@@ -54,12 +56,15 @@ class Pose:
     translations: Array
     moving: tuple[int, ...] = (0,)
 
+    def __repr__(self) -> str:
+        return f"Pose({len(self.skeleton)} joints)"
+
     def compute_transforms(self) -> tuple[Array, Array]:
         """World positions (J, 3) [m] and rotations (J, 4)."""
         return self.skeleton.compute_transforms(self.rotations, self.translations, self.moving)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """F frames of a skeleton at a constant rate.
 
@@ -82,6 +87,9 @@ class Motion:
     dofs: Dofs = field(default_factory=Dofs.undeclared)
     space: FileSpace = field(default_factory=FileSpace)
     name: str = "motion"
+
+    def __repr__(self) -> str:
+        return f"Motion({self.name!r}, {len(self)} frames at {self.rate:g} Hz, {len(self.skeleton)} joints)"
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__

@@ -32,7 +32,7 @@ def frozen(values: object, dtype: type = np.float64) -> NDArray[np.generic]:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Skeleton:
     """A tree of joints with rest offsets; joint 0 is the root and ``parents[j] < j``.
 
@@ -51,6 +51,9 @@ class Skeleton:
     site_names: tuple[str, ...] = ()
     site_parents: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     site_offsets: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __repr__(self) -> str:
+        return f"Skeleton({len(self)} joints, {len(self.site_names)} sites, root {self.names[0]!r})"
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__

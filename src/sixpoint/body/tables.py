@@ -10,9 +10,14 @@ from typing import Any
 from sixpoint.errors import FormatError
 
 
+def shipped_text(name: str) -> str:
+    """The text of a table of ``body/data``."""
+    return resources.files("sixpoint.body").joinpath(f"data/{name}").read_text("utf-8")
+
+
 def read_shipped(name: str) -> dict[str, Any]:
     """A table of ``body/data``."""
-    return tomllib.loads(resources.files("sixpoint.body").joinpath(f"data/{name}").read_text("utf-8"))
+    return tomllib.loads(shipped_text(name))
 
 
 def read_table(path: str | Path) -> dict[str, Any]:

@@ -16,7 +16,7 @@ EFFECTORS = ("pelvis", "head", "l_wrist", "r_wrist", "l_ankle", "r_ankle")
 """The one order of the six effectors."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Targets:
     """Positions of the six effectors over F frames.
 
@@ -31,6 +31,9 @@ class Targets:
     rate: float
     rotations: Array | None = None
     name: str = "targets"
+
+    def __repr__(self) -> str:
+        return f"Targets({self.name!r}, {len(self)} frames at {self.rate:g} Hz)"
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__

@@ -109,7 +109,7 @@ def _show(screen: Screen, file: Path, done: Reconstruction, stature: float | Non
     screen.say(f"{file}: {describe.describe_length(len(done.targets), done.targets.rate)}", style="bold")
     if done.opened is None:
         chosen = "" if stature else "; give your own with --stature or --skeleton"
-        screen.rows([("figure", f"built-in, {stature or STATURE:g} m tall{chosen}")])
+        screen.rows([("figure", f"built-in, {STATURE if stature is None else stature:g} m tall{chosen}")])
     else:
         joints = describe.plural(len(done.figure.skeleton), "joint")
         screen.rows(

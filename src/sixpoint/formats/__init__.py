@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
@@ -88,7 +86,7 @@ def save(
     force: bool = False,
     unit: str | float | None = None,
     up: str | None = None,
-    order: str = "ZYX",
+    order: str | None = None,
 ) -> None:
     """Write a motion as .bvh, or as .amc with its .asf beside it.
 
@@ -98,7 +96,7 @@ def save(
         force: Overwrite existing files.
         unit: Metres per file unit, or one of m, cm, mm, inch, cmu; by default ``motion.space.unit``.
         up: Up axis of the file; by default ``motion.space.up``. AMC is always written Y up.
-        order: Euler order of a BVH.
+        order: Euler order of a BVH, e.g. "ZYX"; by default ``motion.space.order``, the source's.
 
     Raises:
         FormatError: Nothing was written; the message says why.
@@ -119,7 +117,7 @@ def save(
     try:
         raw = leave_world(motion, space)
         if suffix == ".bvh":
-            texts = [format_bvh(raw, path, order)]
+            texts = [format_bvh(raw, path, order or motion.space.order)]
         else:
             bones = plan_bones(raw, path)
             texts = [format_amc(raw, bones), format_asf(raw, bones)]
@@ -179,8 +177,8 @@ def _check_suffix(path: Path, known: tuple[str, ...], what: str) -> str:
 
 
 def _check_rate(path: Path, rate: float | None) -> None:
-    if rate is not None and not (np.isfinite(rate) and rate > 0):
-        raise FormatError(path, f"the rate must be a positive number of frames per second, got {rate}")
+    if rate is not None and not 1e-3 <= rate <= 1e6:
+        raise FormatError(path, f"the rate is frames per second, 0.001 to 1000000, got {rate}")
 
 
 def _with_path(path: Path, error: SixpointError) -> FormatError:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -125,6 +125,12 @@ def _read_frames(path: Path, lines: Sequence[str], header: _Header, channels: in
     return parse_rows(path, rows, [k + 1 for k in numbers], "frame values")
 
 
+def _common_order(hierarchy: Hierarchy) -> str:
+    """The Euler order of the first joint with three angles; writing uses one order for all."""
+    orders = (rotation_order(channels) for channels in hierarchy.channels)
+    return next((order for order in orders if len(set(order)) == 3), RAW.order)
+
+
 def _assemble(path: Path, hierarchy: Hierarchy, values: Array, rate: float) -> Motion:
     skeleton = hierarchy.skeleton
     frames = len(values)
@@ -149,6 +155,6 @@ def _assemble(path: Path, hierarchy: Hierarchy, values: Array, rate: float) -> M
         placed.translations,
         rate,
         moving=placed.moving,
-        space=RAW,
+        space=replace(RAW, order=_common_order(hierarchy)),
         name=path.stem,
     )

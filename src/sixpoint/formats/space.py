@@ -137,7 +137,7 @@ def detect_space(path: Path, raw: Motion, unit: str | float | None, up: str | No
         axis, up_source = guessed or "y", "guessed" if guessed else "convention"
     else:
         axis, up_source = parse_up(path, up), "given"
-    return FileSpace(metres, axis, unit_source, up_source)
+    return FileSpace(metres, axis, unit_source, up_source, raw.space.order)
 
 
 def find_human_roles(skeleton: Skeleton) -> Roles | None:

@@ -11,7 +11,7 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError
 from sixpoint.formats import TARGET_SUFFIXES, save, save_targets
 from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
-from sixpoint.jobs.writing import check_output
+from sixpoint.jobs.writing import check_output, keep_sources
 
 OUTPUTS = (".bvh", ".amc", *TARGET_SUFFIXES)
 
@@ -58,6 +58,7 @@ def convert(
     reading = reading or Reading()
     from_targets, to_targets = is_targets(source), out.suffix.lower() in TARGET_SUFFIXES
     files = check_output(out, OUTPUTS, force)
+    keep_sources(files, [source, reading.skeleton, mapping])
     if to_targets and (out_unit or out_up):
         raise FormatError(out, "targets are always in metres and Y up: leave out --out-unit and --out-up")
     if from_targets and not to_targets:
@@ -67,7 +68,9 @@ def convert(
         content = _read_points(source, from_targets, reading, mapping, rotations)
         save_targets(content, out, force=force)
     else:
-        content = open_motion(source, reading).motion
+        opened = open_motion(source, reading)
+        keep_sources(files, [source, opened.skeleton])
+        content = opened.motion
         save(content, out, force=force, unit=out_unit, up=out_up)
     return Conversion(content, files)
 

@@ -94,7 +94,9 @@ def open_motion(path: Path, reading: Reading) -> Opened:
 
 
 def open_targets(path: Path, reading: Reading) -> Targets:
-    """Read targets and take the frames asked for."""
+    """Read targets and take the frames asked for; they are always in metres and Y up."""
+    if reading.unit is not None or reading.up is not None:
+        raise FormatError(path, "six points are always in metres and Y up: leave out --unit and --up")
     targets = load_targets(path, rate=reading.rate)
     _check_frames(path, reading.frames, len(targets))
     return targets if reading.frames == ALL else targets.sliced(reading.frames)

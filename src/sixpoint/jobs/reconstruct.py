@@ -17,7 +17,7 @@ from sixpoint.formats import MOTION_SUFFIXES, save
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.solving import Solved, Solving, solve
-from sixpoint.jobs.writing import check_output
+from sixpoint.jobs.writing import check_output, keep_sources
 from sixpoint.study.metrics import Errors, compute_errors
 
 OUTPUTS = (".bvh", ".amc")
@@ -87,7 +87,7 @@ def reconstruct(
         progress: Told how far the work is.
 
     Raises:
-        SixpointError: Nothing was written; the message says why.
+        SixpointError: The message says why. Nothing was written, but for a picture that could not be.
     """
     reading, solving, body = reading or Reading(), solving or Solving(), body or Body()
     solving.check()
@@ -100,6 +100,7 @@ def reconstruct(
         figure, opened, targets = _prepare_targets(source, reading, solving, body)
     else:
         figure, opened, targets = _prepare_motion(source, reading, solving, body)
+    keep_sources(files, [source, body.rig, body.mapping, opened.skeleton if opened else None])
     solved = solve(figure, targets, solving, progress)
     like = opened.motion if opened else None
     truth = None if points_only else like
@@ -154,11 +155,11 @@ def _prepare_targets(
     source: Path, reading: Reading, solving: Solving, body: Body
 ) -> tuple[Figure, Opened | None, Targets]:
     limits = solving.load_limits()
-    targets = open_targets(source, reading)
+    targets = open_targets(source, replace(reading, unit=None, up=None) if body.rig else reading)
     if body.rig is None:
         if body.mapping is not None:
             raise SixpointError("--mapping names joints of a rig: give the rig with --skeleton")
-        return Figure.from_stature(body.stature or STATURE, limits), None, targets
+        return Figure.from_stature(STATURE if body.stature is None else body.stature, limits), None, targets
     if body.rig.suffix.lower() not in MOTION_SUFFIXES:
         raise FormatError(body.rig, "the rig of targets is a .bvh, .asf or .amc file")
     opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))

@@ -31,3 +31,19 @@ def check_output(path: Path, suffixes: Sequence[str], force: bool, hint: str = "
     files = [path, path.with_suffix(".asf")] if suffix == ".amc" else [path]
     check_writable(files, force)
     return files
+
+
+def keep_sources(files: Sequence[Path], sources: Sequence[Path | None]) -> None:
+    """Refuse to write over what is read, even when overwriting is allowed: it could not be read again.
+
+    Args:
+        files: What will be written.
+        sources: What is read; None for nothing.
+
+    Raises:
+        FormatError: A file is also a source.
+    """
+    read = {path.resolve() for path in sources if path is not None}
+    for path in files:
+        if path.resolve() in read:
+            raise FormatError(path, "this file is being read; write to another name")

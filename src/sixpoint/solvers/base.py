@@ -32,7 +32,7 @@ class Status(IntEnum):
     """Some target is unknown (NaN); its limb holds its last local pose, pelvis and head follow each other."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, repr=False, slots=True)
 class Solution:
     """One solved frame.
 
@@ -50,8 +50,11 @@ class Solution:
     iterations: int
     state: tuple[Array, ...]
 
+    def __repr__(self) -> str:
+        return f"Solution({self.status.name}, worst residual {self.residual.max():.4f} m)"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class MotionSolution:
     """Many solved frames.
 
@@ -64,6 +67,9 @@ class MotionSolution:
     motion: Motion
     status: NDArray[np.int64]
     residual: Array
+
+    def __repr__(self) -> str:
+        return f"MotionSolution({self.motion!r}, {self.count(Status.CONVERGED)} frames converged)"
 
     def count(self, status: Status) -> int:
         """Number of frames with a status."""

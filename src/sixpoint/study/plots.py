@@ -8,9 +8,9 @@ without a role are left out. Uses Matplotlib's objects, never pyplot; files are 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from scipy.spatial import ConvexHull
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
+from sixpoint.errors import SixpointError
 
 Array = NDArray[np.float64]
 
@@ -323,13 +324,14 @@ def _style(axes: Axes, times: Array, ylabel: str) -> None:
 def _save(canvas: Canvas, path: str | Path) -> Path:
     """Write a PNG beside its place, then move it there."""
     path = Path(path)
-    handle, temporary = tempfile.mkstemp(suffix=".png", prefix=f".{path.stem}-", dir=path.parent)
-    os.close(handle)
+    FigureCanvasAgg(canvas)
+    picture = BytesIO()
+    canvas.savefig(picture, format="png")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        FigureCanvasAgg(canvas)
-        canvas.savefig(temporary, format="png")
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        temporary.write_bytes(picture.getvalue())
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise SixpointError(f"{path}: the picture cannot be written: {error.strerror}") from error
     return path
