@@ -361,7 +361,7 @@ def test_parallel_chords_keep_the_previous_plane():
 
 
 def test_a_knee_may_hyperextend_where_the_table_says_so():
-    """A negative least flexion is the hinge's range as it is, on both sides; the neutral pose stays neutral."""
+    """A negative least flexion is kept as it is, and the neutral pose stays neutral."""
     table = tomllib.loads(sp.Limits.text())
     table["knee"]["flexion"] = [-10, 150]
     table["elbow"]["flexion"] = [-5, 140]
