@@ -1,6 +1,6 @@
 """Degrees of freedom: per joint, what may move and how far; coordinates q <-> local rotations.
 
-A joint is fixed, a sequence of hinges, or a ball with swing and twist limits (METHODS of section 7 in
+A joint is fixed, a sequence of hinges, or a ball with swing and twist limits (section 7 of
 Unzueta et al. 2008). A free root moves as a ball and translates.
 """
 
