@@ -49,15 +49,14 @@ def test_products_agree_with_scipy(a, b, v):
 
 
 @given(rotations)
-def test_axes_rotation_vectors_and_fractions_agree_with_scipy(q):
-    """Matrix columns, the way back from them, rotation vectors and fractions of a turn are SciPy's."""
+def test_axes_and_fractions_agree_with_scipy(q):
+    """Matrix columns, the way back from them, and fractions of a turn are SciPy's."""
     matrix = Rotation.from_quat(q).as_matrix()
     columns = qt.x_axis(q), qt.y_axis(q), qt.z_axis(q)
     np.testing.assert_allclose(np.transpose(columns), matrix, atol=1e-12)
     assert (Rotation.from_quat(qt.from_axes(*columns)) * Rotation.from_quat(q).inv()).magnitude() < 1e-7
     vector = Rotation.from_quat(q).as_rotvec()
     if np.linalg.norm(vector) < pi - 1e-6:
-        np.testing.assert_allclose(qt.to_rotation_vector(q), vector, atol=1e-9)
         half = Rotation.from_quat(qt.scaled(q, 0.5))
         np.testing.assert_allclose(half.as_rotvec(), 0.5 * vector, atol=1e-9)
 

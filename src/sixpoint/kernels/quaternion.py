@@ -125,17 +125,6 @@ def twist_angle(q, axis):
 
 
 @helper
-def to_rotation_vector(q):
-    """Axis times angle [rad], angle in [0, pi]."""
-    x, y, z, w = q
-    if w < 0.0:
-        x, y, z, w = -x, -y, -z, -w
-    s = sqrt(x * x + y * y + z * z)
-    k = 2.0 if s < 1e-12 else 2.0 * atan2(s, w) / s
-    return (k * x, k * y, k * z)
-
-
-@helper
 def from_axes(x, y, z):
     """Rotation whose matrix has the orthonormal columns x, y, z."""
     trace = x[0] + y[1] + z[2]

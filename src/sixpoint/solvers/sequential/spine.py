@@ -53,7 +53,7 @@ def bending_axis(chord, wanted, local, world, plane):
     wanted chord, on the side it is already bent to; with the listing's flipping sign the way back would
     fold the spine further instead of straightening it. Parallel chords keep the previous plane.
     """
-    bent = (0.0, 0.0, 0.0)  # sum of the interior rotation vectors, in the world
+    bent = (0.0, 0.0, 0.0)  # sum of the interior axes times 2 sin(angle / 2), in the world
     for k in range(1, world.shape[0]):
         q = qt.load(local, k)
         s = 2.0 if q[3] >= 0.0 else -2.0
