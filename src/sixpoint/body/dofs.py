@@ -128,6 +128,23 @@ class Hinges:
         """Number of coordinates."""
         return len(self.axes)
 
+    def compute_angles(self, rotations: ArrayLike) -> Array:
+        """Local rotations (..., 4) -> hinge angles (..., k) [rad].
+
+        What the hinges cannot express is lost: one keeps the twist about its axis, two the first two angles
+        of the decomposition along their axes.
+        """
+        quat = np.asarray(rotations, float)
+        if self.size == 1:
+            angle = 2.0 * np.arctan2(quat[..., :3] @ self.axes[0], quat[..., 3])
+            return np.asarray((angle[..., None] + np.pi) % (2 * np.pi) - np.pi)
+        axes = np.array(self.axes)  # SciPy wants a writable array
+        if self.size == 2:
+            axes = np.vstack([axes, np.cross(axes[0], axes[1])])
+        flat = Rotation.from_quat(quat.reshape(-1, 4))
+        angles = flat.as_davenport(axes, "intrinsic", suppress_warnings=True)
+        return np.asarray(angles[:, : self.size]).reshape(*quat.shape[:-1], self.size)
+
 
 @dataclass(frozen=True, eq=False)
 class Ball:
@@ -194,8 +211,7 @@ class Dofs:
     def compute_coordinates(self, rotations: ArrayLike) -> Array:
         """Local rotations (J, 4) from the neutral pose -> coordinates (n,) [rad].
 
-        What a joint's hinges cannot express is lost: one hinge keeps the twist about its axis, two
-        keep the first two angles of the decomposition along their axes.
+        What a joint's hinges cannot express is lost, see ``Hinges.compute_angles``.
         """
         rotations = np.asarray(rotations, float)
         q = np.zeros(self.size)
@@ -209,11 +225,4 @@ def _coordinates(dof: JointDof, quat: Array) -> Array:
     if isinstance(dof, Ball):
         return np.asarray(Rotation.from_quat(quat).as_rotvec(), float)
     assert isinstance(dof, Hinges)
-    if dof.size == 1:
-        twist = 2.0 * np.arctan2(float(quat[:3] @ dof.axes[0]), float(quat[3]))
-        return np.array([(twist + np.pi) % (2 * np.pi) - np.pi])
-    axes = np.array(dof.axes)  # SciPy wants a writable array
-    if dof.size == 2:
-        axes = np.vstack([axes, np.cross(axes[0], axes[1])])
-    angles = Rotation.from_quat(quat).as_davenport(axes, "intrinsic", suppress_warnings=True)
-    return np.asarray(angles[: dof.size], float)
+    return dof.compute_angles(quat)

@@ -1,7 +1,7 @@
-"""The two decorators of compiled code, and where its machine code is kept.
+"""The decorators of compiled code, and where its machine code is kept.
 
 ``helper`` marks a function called from other compiled code; without compilation it stays plain Python,
-so it can be tested and debugged as such. ``entry`` marks the few functions called from Python.
+so it can be tested and debugged as such. ``algebra`` is a helper for sums over rows. ``entry`` marks the few functions called from Python.
 
 Numba does not notice an edit to a callee in another file, so the cache folder is named by a hash of all
 compiled sources. Where no folder can be written, code is compiled anew in each process.
@@ -37,6 +37,12 @@ OPTIONS = {
 def helper(function: F) -> F:
     """Mark a function for use inside compiled code; from Python it is an ordinary function."""
     return register_jitable(no_cpython_wrapper=True, **OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def algebra(function: F) -> F:
+    """A helper for sums over rows: the compiler may reorder them, so they run several numbers at a time."""
+    reorder = {"reassoc", "contract", "nsz"}
+    return register_jitable(no_cpython_wrapper=True, fastmath=reorder, **OPTIONS)(function)  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:

@@ -151,3 +151,23 @@ def scaled(q, t):
     half = t * atan2(s, w)
     k = sin(half) / s
     return (k * x, k * y, k * z, cos(half))
+
+
+@helper
+def exp(w):
+    """Rotation by the rotation vector w."""
+    angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    half = 0.5 * angle
+    k = 0.5 - half * half / 12.0 if angle < 1e-4 else sin(half) / angle
+    return (k * w[0], k * w[1], k * w[2], cos(half))
+
+
+@helper
+def log(q):
+    """Rotation vector of q, of length 0 to pi."""
+    x, y, z, w = q
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    s = sqrt(x * x + y * y + z * z)
+    k = 2.0 if s < 1e-9 else 2.0 * atan2(s, w) / s
+    return (k * x, k * y, k * z)

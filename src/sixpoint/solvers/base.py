@@ -5,8 +5,8 @@ A solver is made once for a figure. What the next frame needs travels in the sol
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
@@ -39,9 +39,11 @@ class Solution:
     Attributes:
         pose: The posture, on the figure's own rig.
         status: How it went.
-        residual: (6,) distance of each effector to its target [m]; 0 where the target is lost.
+        residual: (6,) distance of each effector to its target [m]; 0 where the target is lost. Of prioritized
+            IK the error of every task [m or rad].
         iterations: Frame updates used; 1 for a sequential method.
         state: What the next frame needs; give the whole solution as ``previous``.
+        gave_way: Of prioritized IK: unmet task -> tasks (or "joint limits") that hold the motion it needs.
     """
 
     pose: Pose
@@ -49,6 +51,7 @@ class Solution:
     residual: Array
     iterations: int
     state: tuple[Array, ...]
+    gave_way: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, worst residual {self.residual.max():.4f} m)"

@@ -1,0 +1,170 @@
+"""Linear algebra of prioritized tasks: rows of one scratch array, orthonormal bases, small damped solutions.
+
+All long vectors are rows of one array, addressed by row number; small matrices are corners of another.
+"""
+
+from math import sqrt
+
+from sixpoint.kernels.jit import algebra, helper
+
+
+@algebra
+def dot(rows, i, k):
+    total = 0.0
+    for c in range(rows.shape[1]):
+        total += rows[i, c] * rows[k, c]
+    return total
+
+
+@algebra
+def add(rows, i, factor, k):
+    """Row i += factor * row k."""
+    for c in range(rows.shape[1]):
+        rows[i, c] += factor * rows[k, c]
+
+
+@helper
+def clear(rows, i):
+    for c in range(rows.shape[1]):
+        rows[i, c] = 0.0
+
+
+@helper
+def copy(rows, i, k):
+    """Row i = row k."""
+    for c in range(rows.shape[1]):
+        rows[i, c] = rows[k, c]
+
+
+@helper
+def reject(rows, i, first, last):
+    """Remove from row i its part in the span of the orthonormal rows first ... last - 1."""
+    if last <= first:
+        return
+    before = dot(rows, i, i)
+    for _ in range(2):  # once more if cancellation left rounding errors
+        for k in range(first, last):
+            add(rows, i, -dot(rows, i, k), k)
+        after = dot(rows, i, i)
+        if after > 0.25 * before or after == 0.0:
+            return
+        before = after
+
+
+@helper
+def extend_basis(rows, first, count, basis, size, small, threshold):
+    """Split the rows first ... first + count - 1 = L V + (something in the span of the basis).
+
+    V are orthonormal rows appended to the ``size`` rows that start at ``basis``, by Gram-Schmidt with row
+    pivoting; it stops where what is left is shorter than ``threshold``. L is small[:count, :rank].
+
+    Returns the rank. The given rows are destroyed.
+    """
+    for i in range(first, first + count):
+        reject(rows, i, basis, basis + size)
+    rank = 0
+    while rank < count:
+        largest, pivot = threshold * threshold, -1
+        for i in range(first, first + count):
+            square = dot(rows, i, i)
+            if square > largest:
+                largest, pivot = square, i
+        if pivot < 0:
+            break
+        new = basis + size + rank
+        copy(rows, new, pivot)
+        if rank:
+            reject(rows, new, basis, new)
+        length = sqrt(dot(rows, new, new))
+        for c in range(rows.shape[1]):
+            rows[new, c] /= length
+        for i in range(count):
+            part = dot(rows, first + i, new)
+            small[i, rank] = part
+            add(rows, first + i, -part, new)
+        clear(rows, pivot)
+        rank += 1
+    return rank
+
+
+@helper
+def damping(sigma, wanted):
+    """Damping factor that bounds the norm of the damped solution.
+
+    Args:
+        sigma: Smallest retained singular value.
+        wanted: Norm of the task over the largest norm of the solution.
+
+    Reference: Maciejewski 1990.
+    """
+    if sigma >= wanted:
+        return 0.0
+    if sigma >= 0.5 * wanted:
+        return sqrt(sigma * (wanted - sigma))
+    return 0.5 * wanted
+
+
+@helper
+def orthogonalise(small, count, rank):
+    """One-sided Jacobi: turn the columns of B = small[:count, :rank] to be orthogonal, B = L W.
+
+    W is written to small[count:count + rank, :rank]; the norms of the columns are the singular values.
+    """
+    for i in range(rank):
+        for k in range(rank):
+            small[count + i, k] = 1.0 if i == k else 0.0
+    for _ in range(30):
+        turned = False
+        for i in range(rank - 1):
+            for k in range(i + 1, rank):
+                aa, bb, ab = 0.0, 0.0, 0.0
+                for c in range(count):
+                    aa += small[c, i] * small[c, i]
+                    bb += small[c, k] * small[c, k]
+                    ab += small[c, i] * small[c, k]
+                if ab * ab <= 1e-28 * aa * bb:
+                    continue
+                turned = True
+                zeta = (bb - aa) / (2.0 * ab)
+                t = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + sqrt(1.0 + zeta * zeta))
+                cosine = 1.0 / sqrt(1.0 + t * t)
+                sine = cosine * t
+                for c in range(count + rank):
+                    x, y = small[c, i], small[c, k]
+                    small[c, i] = cosine * x - sine * y
+                    small[c, k] = sine * x + cosine * y
+        if not turned:
+            return
+
+
+@helper
+def solve_damped(small, count, rank, right, answer, largest, threshold):
+    """Damped least squares: answer (rank,) minimises |L y - right|^2 + lambda^2 |y|^2.
+
+    L = small[:count, :rank] is destroyed; small[right, :count] is the right side, the answer is written to
+    small[answer, :rank]. Lambda bounds the norm of the answer by ``largest`` (``damping``).
+    """
+    orthogonalise(small, count, rank)
+    norm = 0.0
+    for c in range(count):
+        norm += small[right, c] * small[right, c]
+    least = 1e300
+    for k in range(rank):
+        square = 0.0
+        for c in range(count):
+            square += small[c, k] * small[c, k]
+        if square > threshold * threshold:
+            least = min(least, square)
+        small[answer, k] = 0.0
+    if least > 1e299:
+        return
+    shrink = damping(sqrt(least), sqrt(norm) / largest)
+    for k in range(rank):
+        square, along = 0.0, 0.0
+        for c in range(count):
+            square += small[c, k] * small[c, k]
+            along += small[c, k] * small[right, c]
+        if square > threshold * threshold:
+            along /= square + shrink * shrink
+            for i in range(rank):
+                small[answer, i] += small[count + i, k] * along

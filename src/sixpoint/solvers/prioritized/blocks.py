@@ -1,0 +1,246 @@
+"""Lower one task to blocks of rows: which joint, which offset, which numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body.dofs import Ball, Hinges
+from sixpoint.errors import SixpointError
+from sixpoint.kernels import distance
+from sixpoint.solvers.prioritized import packing
+from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.prioritized.limbs import find_limb
+from sixpoint.solvers.prioritized.tasks import (
+    AlignTask,
+    BalanceTask,
+    Box,
+    Capsule,
+    CouplingTask,
+    FlextTask,
+    HalfSpace,
+    LookAtTask,
+    ObstacleTask,
+    OrientationTask,
+    PlaneTask,
+    PositionTask,
+    Shape,
+    Sphere,
+    Task,
+)
+
+Array = NDArray[np.float64]
+
+METRES, RADIANS = 1e-3, 1e-2
+"""Errors at which iterating stops, by default."""
+ACCEPTED = 10.0
+"""A frame counts as met within so many times the tolerance: 1 cm, as in Unzueta et al. 2008, section 9."""
+ROTATION_STEP = 0.3
+CHAIN_SHARE = 0.1
+"""Largest wanted change of one iteration: 10 % of the driving chain (Boulic and Raunhardt 2009), 0.3 rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows that belong together: integers, numbers and the priority level they were asked for."""
+
+    index: NDArray[np.int64]
+    values: Array
+    level: int
+
+
+def _block(
+    kind: int, task: Task, k: int, rows: int, joint: int, level: int, step: float, **extra: Any
+) -> Block:
+    index = np.zeros(packing.BLOCK_INTEGERS, np.int64)
+    values = np.zeros(packing.BLOCK_NUMBERS)
+    index[packing.KIND], index[packing.TASK], index[packing.COUNT] = kind, k, rows
+    index[packing.JOINT] = joint
+    angular = kind in (packing.ORIENTATION, packing.LOOK_AT, packing.ALIGNMENT, packing.COUPLING)
+    tolerance = task.tolerance or (RADIANS if angular else METRES)
+    values[packing.WEIGHT], values[packing.STEP] = task.weight, step
+    values[packing.TOLERANCE], values[packing.ACCEPT] = tolerance, ACCEPTED * tolerance
+    for name, value in extra.items():
+        column = getattr(packing, name.upper())
+        if name in ("root", "middle", "shape", "option"):
+            index[column] = value
+        elif np.ndim(value):
+            values[column : column + 3] = value
+        else:
+            values[column] = value
+    return Block(index, values, level)
+
+
+def _point(body: Articulation, name: str, offset: object) -> tuple[int, Array]:
+    joint, base = body.place(name)
+    shift = np.asarray(offset, float)
+    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
+        raise SixpointError(f"an offset is three finite numbers [m], got {offset} at {name!r}")
+    return joint, base + shift
+
+
+def _direction(task: Task, axis: object) -> Array:
+    vector = np.asarray(axis, float)
+    length = np.linalg.norm(vector)
+    if vector.shape != (3,) or not 1e-9 < length < np.inf:
+        raise SixpointError(f"{task.label}: the axis is three numbers, not all zero; got {axis}")
+    return vector / length
+
+
+def _reach(body: Articulation, joint: int, offset: Array) -> float:
+    """Largest step of a point [m]: a share of the chain that drives it."""
+    path = body.tree.path(0, joint)
+    below = [j for j in path[1:] if j > body.base]
+    length = float(np.linalg.norm(body.tree.offsets[below], axis=1).sum() + np.linalg.norm(offset))
+    return CHAIN_SHARE * max(length, 0.5 if body.dofs.free_root else 1e-3)
+
+
+def lower_task(body: Articulation, task: Task, k: int) -> list[Block]:
+    """Blocks of one task; ``k`` is its row among the goals.
+
+    Raises:
+        SixpointError: It hangs on a joint that does not exist, or its numbers make no sense.
+    """
+    match task:
+        case FlextTask():
+            return _flext(body, task, k)
+        case PositionTask():
+            joint, offset = _point(body, task.at, task.offset)
+            step = _reach(body, joint, offset)
+            return [_block(packing.POSITION, task, k, 3, joint, task.level, step, offset=offset)]
+        case OrientationTask():
+            joint, _ = _point(body, task.at, task.offset)
+            return [_block(packing.ORIENTATION, task, k, 3, joint, task.level, ROTATION_STEP)]
+        case LookAtTask() | AlignTask():
+            kind = packing.LOOK_AT if isinstance(task, LookAtTask) else packing.ALIGNMENT
+            joint, offset = _point(body, task.at, task.offset)
+            axis = _direction(task, task.axis)
+            return [
+                _block(kind, task, k, 2, joint, task.level, ROTATION_STEP, offset=offset, direction=axis)
+            ]
+        case PlaneTask():
+            joint, offset = _point(body, task.at, task.offset)
+            return [_avoidance(body, packing.PLANE, task, k, joint, offset, HalfSpace(), task.margin, 0.0)]
+        case ObstacleTask():
+            return _obstacle(body, task, k)
+        case BalanceTask():
+            return [_balance(body, task, k)]
+        case CouplingTask():
+            return [_coupling(body, task, k)]
+        case _:
+            raise SixpointError(f"{type(task).__name__} is not a task")
+
+
+def _avoidance(
+    body: Articulation,
+    kind: int,
+    task: Task,
+    k: int,
+    joint: int,
+    offset: Array,
+    shape: Shape,
+    margin: float,
+    buffer: float,
+) -> Block:
+    if not (0 <= margin < np.inf and 0 <= buffer < np.inf):
+        raise SixpointError(f"{task.label}: margin and buffer are lengths from 0 [m]")
+    number, size = _size(task, shape)
+    step = _reach(body, joint, offset)
+    return _block(
+        kind,
+        task,
+        k,
+        1,
+        joint,
+        task.level,
+        step,
+        offset=offset,
+        shape=number,
+        size=size,
+        ratio=margin,
+        buffer=buffer,
+    )
+
+
+def _size(task: Task, shape: Shape) -> tuple[int, Array]:
+    match shape:
+        case Sphere(radius):
+            number, size = distance.SPHERE, [radius, 0.0, 0.0]
+        case Capsule(radius, length):
+            number, size = distance.CAPSULE, [radius, 0.5 * length, 0.0]
+        case Box(sides):
+            number, size = distance.BOX, [0.5 * side for side in sides]
+        case HalfSpace():
+            number, size = distance.HALF_SPACE, [0.0, 0.0, 0.0]
+        case _:
+            raise SixpointError(f"{task.label}: a shape is a Sphere, Capsule, Box or HalfSpace")
+    array = np.asarray(size, float)
+    if array.shape != (3,) or not np.all((array >= 0) & np.isfinite(array)):
+        raise SixpointError(f"{task.label}: sizes of a shape are lengths from 0 [m], got {shape}")
+    return number, array
+
+
+def _obstacle(body: Articulation, task: ObstacleTask, k: int) -> list[Block]:
+    points = [_point(body, task.at, task.offset)]
+    points += [_point(body, p, (0, 0, 0)) if isinstance(p, str) else _point(body, *p) for p in task.points]
+    return [
+        _avoidance(body, packing.OBSTACLE, task, k, joint, offset, task.shape, task.margin, task.buffer)
+        for joint, offset in points
+    ]
+
+
+def _balance(body: Articulation, task: BalanceTask, k: int) -> Block:
+    step = CHAIN_SHARE
+    if task.target == "point":
+        return _block(packing.BALANCE_POINT, task, k, 2, 0, task.level, step)
+    if task.target != "polygon":
+        raise SixpointError(f"{task.label}: the target is 'polygon' or 'point', got {task.target!r}")
+    return _block(packing.BALANCE, task, k, 1, 0, task.level, step, ratio=task.margin)
+
+
+def _coupling(body: Articulation, task: CouplingTask, k: int) -> Block:
+    joint, other = body.place(task.at)[0], body.place(task.other)[0]
+    a, b = body.dofs[joint], body.dofs[other]
+    alike = (isinstance(a, Ball) and isinstance(b, Ball)) or (
+        isinstance(a, Hinges) and isinstance(b, Hinges) and a.size == b.size
+    )
+    if joint == other or not alike:
+        raise SixpointError(
+            f"{task.label}: coupled are two joints of one kind, both balls or with as many hinges; "
+            f"{task.at!r} and {task.other!r} are not"
+        )
+    if not np.isfinite(task.ratio):
+        raise SixpointError(f"{task.label}: the ratio is a finite number, got {task.ratio}")
+    return _block(
+        packing.COUPLING, task, k, a.size, joint, task.level, ROTATION_STEP, root=other, ratio=task.ratio
+    )
+
+
+def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
+    joint, offset = _point(body, task.at, task.offset)
+    limb = find_limb(body, task, joint, offset)
+    forms = {"tangent": 0, "exponential": packing.EXPONENTIAL, "hinge": packing.HINGE_ONLY}
+    if task.form not in forms:
+        raise SixpointError(f"{task.label}: the form is one of {', '.join(forms)}; got {task.form!r}")
+    common = {
+        "offset": offset,
+        "root": limb.root,
+        "middle": limb.middle,
+        "option": forms[task.form] | (packing.PREDICT if task.predict else 0),
+        "side": limb.side,
+        "low": limb.low,
+        "high": limb.high,
+    }
+    step = CHAIN_SHARE * limb.length
+    across = task.level + 1 if task.tangential_level is None else task.tangential_level
+    blocks = [
+        _block(packing.FLEXT, task, k, 1, joint, task.level, step, **common),
+        _block(packing.TANGENTIAL, task, k, 2, joint, across, step, **common),
+    ]
+    if task.drag:
+        level = task.level + 2 if task.drag_level is None else task.drag_level
+        blocks.append(_block(packing.DRAG, task, k, 1, joint, level, step, **common))
+    return blocks

@@ -1,0 +1,232 @@
+"""The loop of one frame, and the compiled entry: frames of goals in, poses out."""
+
+from sixpoint.kernels import linear
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.prioritized import packing
+from sixpoint.solvers.prioritized.kinematics import compute_world, locals_of_hinges, retract
+from sixpoint.solvers.prioritized.limits import enforce_approaches, hold_limits, lock_violations, release
+from sixpoint.solvers.prioritized.packing import BALL, unpack_model, unpack_scratch, unpack_settings
+from sixpoint.solvers.prioritized.rows import OFF, RADIAN, build_block
+from sixpoint.solvers.prioritized.step import prioritized_step, scale_step
+from sixpoint.solvers.prioritized.yielding import report_yielding
+
+CONVERGED, UNREACHABLE, LOST = 0, 1, 2
+STALL, STALL_STEPS = 1e-4, 3  # less total improvement [m] than this over so many iterations: no more to gain
+
+
+@helper
+def evaluate(m, w, index, values, goals, state, settings):
+    """All errors and rows at the state."""
+    compute_world(m, w, state)
+    for b in range(len(index)):
+        build_block(m, w, index, values, b, goals, state, settings.gain)
+
+
+@helper
+def total_errors(m, w, index, totals):
+    """Summed error of each level [m] in ``totals``; returns their sum."""
+    everything = 0.0
+    for level in range(len(m.levels)):
+        totals[level] = 0.0
+    for b in range(len(index)):
+        if w.block[b, 2] == OFF:
+            continue
+        kind = index[b, packing.KIND]
+        angular = kind == packing.ORIENTATION or kind == packing.LOOK_AT
+        angular = angular or kind == packing.ALIGNMENT or kind == packing.COUPLING
+        error = w.block[b, 0] * (RADIAN if angular else 1.0)
+        totals[index[b, packing.LEVEL]] += error
+        everything += error
+    return everything
+
+
+@helper
+def all_within(w, index, values, column):
+    """Whether the error of every active block is within its tolerance."""
+    for b in range(len(index)):
+        if w.block[b, 2] != OFF and w.block[b, 0] > values[b, column]:
+            return False
+    return True
+
+
+@helper
+def is_better(totals, best, levels):
+    """Whether errors are smaller, the most important level first."""
+    for level in range(levels):
+        if totals[level] < best[level] - 1e-6:
+            return True
+        if totals[level] > best[level] + 1e-6:
+            return False
+    return True
+
+
+@helper
+def posture_wish(m, w, state, attractor, step, row):
+    """Step of the posture optimisation in a row: down the gradient of the weighted distance to the attractor.
+
+    Reference: section 1 of Baerlocher and Boulic 2004; Liegeois 1977.
+    """
+    linear.clear(w.rows, row)
+    joints = len(m.parent)
+    longest = 0.0
+    for j in range(joints):
+        start = m.start[j]
+        if m.size[j] == 0:
+            continue
+        if m.kind[j] == BALL:
+            gap = qt.log(qt.mul(qt.load(attractor, j), qt.inv(qt.load(state, j))))
+            for k in range(3):
+                w.rows[row, start + k] = step * m.bounds[start + k, 2] * gap[k]
+        else:
+            for k in range(m.size[j]):
+                gap = attractor[joints + 1 + j, k] - state[joints + 1 + j, k]
+                w.rows[row, start + k] = step * m.bounds[start + k, 2] * gap
+        for k in range(m.size[j]):
+            longest = max(longest, abs(w.rows[row, start + k]))
+    if longest > 0.1:
+        for c in range(w.rows.shape[1]):
+            w.rows[row, c] *= 0.1 / longest
+
+
+@helper
+def limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture):
+    """The clamping loop: solve, turn what is violated into equalities, solve again."""
+    step, work = fixed + 1, fixed + 3
+    basis = work + w.small.shape[1]
+    linear.clear(w.rows, fixed)
+    release(m, w)
+    for _ in range(len(m.hinges) + len(index) + 2):
+        prioritized_step(m, w, index, values, goals, state, settings, fixed, step, posture, work, basis)
+        violated = enforce_approaches(w, index, values, step)
+        if settings.limits and lock_violations(m, w, balls, state, step, fixed):
+            violated = True
+        if not violated:
+            return
+
+
+@helper
+def solve_frame(m, w, balls, index, values, goals, state, attractor, best, settings):
+    """Improve the state for one frame of goals; the best state seen is left in ``state``. Returns iterations."""
+    joints, levels = len(m.parent), len(m.levels)
+    fixed = len(w.row)
+    least, totals = best[2 * joints + 1 :, 0], best[2 * joints + 1 :, 1]
+    for k in range(levels):
+        least[k] = 1e300
+    if settings.limits:
+        hold_limits(m, balls, state)
+    history = (1e300, 1e300, 1e300)
+    iterations = 0
+    while True:
+        evaluate(m, w, index, values, goals, state, settings)
+        everything = total_errors(m, w, index, totals)
+        if is_better(totals, least, levels):
+            for i in range(2 * joints + 1):
+                for k in range(4):
+                    best[i, k] = state[i, k]
+            for k in range(levels):
+                least[k] = totals[k]
+        met = all_within(w, index, values, packing.TOLERANCE)
+        if iterations >= settings.least and met:
+            break
+        if iterations >= settings.most or (not met and history[0] - everything < STALL):
+            break
+        history = (history[1], history[2], everything)
+        posture = -1
+        if settings.posture_step > 0.0 and (met or not settings.posture_after):
+            posture = fixed + 2
+            posture_wish(m, w, state, attractor, settings.posture_step, posture)
+        limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
+        scale_step(m, w, settings, fixed + 1)
+        retract(m, w, state, fixed + 1)
+        if settings.limits:
+            hold_limits(m, balls, state)
+        iterations += 1
+    for i in range(2 * joints + 1):
+        for k in range(4):
+            state[i, k] = best[i, k]
+    locals_of_hinges(m, state)
+    evaluate(m, w, index, values, goals, state, settings)
+    return iterations
+
+
+@helper
+def status_of(w, index, values, residual):
+    """Residual of every task, and how the frame went."""
+    status = CONVERGED
+    for t in range(len(residual)):
+        residual[t] = 0.0
+    for b in range(len(index)):
+        t = index[b, packing.TASK]
+        if w.block[b, 2] == OFF and index[b, packing.KIND] != packing.DRAG:
+            status = LOST
+        residual[t] = max(residual[t], w.block[b, 0])
+        if status != LOST and w.block[b, 0] > values[b, packing.ACCEPT]:
+            status = UNREACHABLE
+    return status
+
+
+@entry
+def solve_frames(
+    table,
+    integers,
+    balls,
+    index,
+    values,
+    options,
+    goals,
+    starts,
+    state,
+    attractor,
+    best,
+    vectors,
+    rows,
+    small,
+    marks,
+    rotations,
+    translations,
+    status,
+    residual,
+    iterations,
+    yielded,
+):
+    """Solve every frame of goals (F, T, 7).
+
+    The state goes from frame to frame unless ``starts`` holds one for the frame. Written are the rig's local
+    rotations, the base's position, status, residuals, iterations, and which task gave way to which.
+    """
+    m = unpack_model(table, integers)
+    joints, columns = len(m.parent), len(m.hinges)
+    w = unpack_scratch(
+        vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points)
+    )
+    settings = unpack_settings(options)
+    for f in range(len(goals)):
+        if f < len(starts):
+            for i in range(len(state)):
+                for k in range(4):
+                    state[i, k] = starts[f, i, k]
+        iterations[f] = solve_frame(
+            m, w, balls, index, values, goals[f], state, attractor, best, settings
+        )
+        status[f] = status_of(w, index, values, residual[f])
+        if f < len(yielded) and status[f] != CONVERGED:
+            report_yielding(m, w, index, values, goals[f], len(w.row), yielded[f])
+        for j in range(joints):
+            local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(state, j)), qt.load(m.after, j))
+            qt.store(rotations[f], j, local)
+        vec.store(translations, f, vec.load(state, joints))
+
+
+@entry
+def evaluate_rows(
+    table, integers, balls, index, values, options, goals, state, vectors, rows, small, marks
+):
+    """Errors and Jacobian rows at a state, for one frame of goals; FLEXT's rows as at the first level."""
+    m = unpack_model(table, integers)
+    joints, columns = len(m.parent), len(m.hinges)
+    w = unpack_scratch(
+        vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points)
+    )
+    evaluate(m, w, index, values, goals, state, unpack_settings(options))

@@ -1,0 +1,338 @@
+"""Each kind of constraint: its error, its wanted change and its rows of the Jacobian.
+
+Rows that are angles are scaled by ``RADIAN`` so that they stand beside metres at one level.
+
+Reference: Baerlocher and Boulic 2004; Boulic and Raunhardt 2009; Peinado et al. 2009 for obstacles.
+"""
+
+from math import atan2, pi, tan
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.distance import signed_distance
+from sixpoint.kernels.jit import helper
+from sixpoint.kernels.linear import clear
+from sixpoint.solvers.prioritized import flext, packing
+from sixpoint.solvers.prioritized.kinematics import add_mass_row, add_row, compute_masses, motion_of, place_of
+from sixpoint.solvers.prioritized.packing import FIRST, JOINT, KIND, MIDDLE, ROOT
+from sixpoint.solvers.prioritized.support import compute_hull, inside_distance
+
+RADIAN = 0.2  # metres that a radian counts for
+OFF, EQUAL, WAITING, ENFORCED = 0.0, 1.0, 2.0, 3.0
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+NONE = (0.0, 0.0, 0.0)
+
+
+@helper
+def triple(values, b, column):
+    return (values[b, column], values[b, column + 1], values[b, column + 2])
+
+
+@helper
+def perpendicular(u):
+    """A unit vector perpendicular to the unit vector u."""
+    if abs(u[0]) < 0.6:
+        return vec.unit(vec.cross(u, X))
+    return vec.unit(vec.cross(u, Y))
+
+
+@helper
+def limited(error, gain, step):
+    """Factor that makes the wanted change ``gain`` of the error, at most ``step`` (norms)."""
+    if error * gain <= step:
+        return gain
+    return step / error
+
+
+@helper
+def known(goals, t, kind):
+    """Whether the parts of the goal that a kind needs are finite numbers."""
+    first, last = 0, 3
+    if kind == packing.ORIENTATION:
+        first, last = 3, 7
+    elif kind == packing.PLANE or kind == packing.OBSTACLE:
+        last = 7
+    elif kind == packing.BALANCE or kind == packing.COUPLING:
+        last = 0
+    for k in range(first, last):
+        if not abs(goals[t, k]) < 1e9:
+            return False
+    return True
+
+
+@helper
+def set_rows(w, r, error, factor, weight):
+    for k in range(3):
+        w.row[r + k, 0] = factor * weight * error[k]
+
+
+@helper
+def limb_of(m, w, index, values, b, state):
+    """Root, middle, effector, axis, hinge angle of the limb of a FLEXT block."""
+    joints = len(m.parent)
+    middle = index[b, MIDDLE]
+    root = vec.load(w.position, index[b, ROOT])
+    axis = vec.load(w.axis, m.start[middle])
+    end = place_of(m, w, index[b, JOINT], triple(values, b, packing.OFFSET))
+    return root, vec.load(w.position, middle), end, axis, state[joints + 1 + middle, 0]
+
+
+@helper
+def flext_wish(root, middle, end, axis, angle, goal, lost_root, lost_end, low, high):
+    """The triangle of a limb and how much L3 should grow for the goal [m], given predicted motions."""
+    l1, l2, l3, sigma, alpha, offset = flext.triangle(root, middle, end, axis)
+    gamma = flext.wrapped(sigma - angle)
+    root_there, end_there = vec.add(root, lost_root), vec.add(end, lost_end)
+    to_goal = vec.sub(goal, root_there)
+    there = vec.dot(to_goal, to_goal) - offset * offset
+    now = vec.sub(end_there, root_there)
+    here = vec.dot(now, now) - offset * offset
+    wish = max(there, 0.0) ** 0.5 - max(here, 0.0) ** 0.5
+    return l1, l2, l3, sigma, alpha, wish, low + gamma, high + gamma
+
+
+@helper
+def build_flext(m, w, index, values, b, goal, state, gain, dq):
+    """Row and task of a FLEXT block, given what higher levels already do (row ``dq``, or -1)."""
+    r = index[b, FIRST]
+    clear(w.rows, r)
+    root, middle, end, axis, angle = limb_of(m, w, index, values, b, state)
+    shift, lost = NONE, NONE
+    if dq >= 0 and index[b, packing.OPTION] & packing.PREDICT:
+        shift = motion_of(m, w, index[b, ROOT], root, dq)
+        lost = motion_of(m, w, index[b, JOINT], end, dq)
+    low, high = values[b, packing.LOW], values[b, packing.HIGH]
+    l1, l2, l3, sigma, alpha, wish, low, high = flext_wish(
+        root, middle, end, axis, angle, goal, shift, lost, low, high
+    )
+    wish = wish * limited(abs(wish), gain, values[b, packing.STEP])
+    side = values[b, packing.SIDE]
+    turn, bend, todo, _ = flext.solve_triangle(l1, l2, l3, sigma, alpha, wish, side, low, high)
+    if todo < 0.0:
+        return
+    c = m.start[index[b, MIDDLE]]
+    if index[b, packing.OPTION] & packing.HINGE_ONLY:
+        w.rows[r, c] = 1.0
+        w.row[r, 0] = todo * bend
+    else:
+        norm = add_root_turn(m, w, index, b, r, axis, turn, state)
+        w.rows[r, c] = bend
+        norm = (norm + bend * bend) ** 0.5
+        for k in range(w.rows.shape[1]):
+            w.rows[r, k] /= norm
+        w.row[r, 0] = todo * norm
+    if dq >= 0 and not index[b, packing.OPTION] & packing.PREDICT:
+        for k in range(w.rows.shape[1]):
+            w.row[r, 0] -= w.rows[r, k] * w.rows[dq, k]
+
+
+@helper
+def add_root_turn(m, w, index, b, r, axis, turn, state):
+    """Write the root joint's part of the posture variation into row r; returns its squared norm."""
+    j = index[b, ROOT]
+    start = m.start[j]
+    if m.kind[j] == packing.BALL:
+        p = m.parent[j]
+        local = axis if p < 0 else qt.inv_mul_vec(qt.load(w.rotation, p), axis)
+        part = vec.scale(turn, local)
+        if index[b, packing.OPTION] & packing.EXPONENTIAL:
+            part = flext.exponential(qt.load(state, j), local, turn)
+        for k in range(3):
+            w.rows[r, start + k] = part[k]
+        return vec.dot(part, part)
+    # A sequence of hinges: the angles whose axes add up to the turn, least squares.
+    square = 0.0
+    part = hinges_for(m, w, j, vec.scale(turn, axis))
+    for k in range(m.size[j]):
+        w.rows[r, start + k] = part[k]
+        square += part[k] * part[k]
+    return square
+
+
+@helper
+def hinges_for(m, w, j, turn):
+    """Angles x of up to three hinges with sum x_k axis_k nearest to a small turn (Gauss-Seidel on few axes)."""
+    x = (0.0, 0.0, 0.0)
+    a = vec.load(w.axis, m.start[j])
+    b = vec.load(w.axis, m.start[j] + 1) if m.size[j] > 1 else NONE
+    c = vec.load(w.axis, m.start[j] + 2) if m.size[j] > 2 else NONE
+    for _ in range(20):
+        rest = vec.sub(vec.sub(turn, vec.scale(x[1], b)), vec.scale(x[2], c))
+        first = vec.dot(a, rest)
+        rest = vec.sub(vec.sub(turn, vec.scale(first, a)), vec.scale(x[2], c))
+        second = vec.dot(b, rest)
+        rest = vec.sub(vec.sub(turn, vec.scale(first, a)), vec.scale(second, b))
+        third = vec.dot(c, rest)
+        change = abs(first - x[0]) + abs(second - x[1]) + abs(third - x[2])
+        x = (first, second, third)
+        if change < 1e-12:
+            break
+    return x
+
+
+@helper
+def tangent_coordinates(q, ratio, w, r, start):
+    """Rows r, r + 1, r + 2: ratio times the derivative of the rotation vector of q by its ball's columns."""
+    v = qt.log(q)
+    square = vec.dot(v, v)
+    k = 1.0 / 12.0
+    if square > 1e-6:
+        phi = square**0.5
+        k = 1.0 / square - 0.5 / (phi * tan(0.5 * phi)) if phi < pi - 1e-9 else 1.0 / square
+    for c in range(3):
+        e = (X, Y, Z)[c]
+        once = vec.cross(v, e)
+        d = vec.madd(vec.madd(e, -0.5, once), k, vec.cross(v, once))
+        for i in range(3):
+            w.rows[r + i, start + c] = ratio * d[i]
+    return v
+
+
+@helper
+def build_unilateral(w, b, r, distance, gain, step, weight):
+    """A distance that must not become negative: enforced at once if it is, otherwise it waits."""
+    w.block[b, 0] = max(0.0, -distance)
+    w.block[b, 1] = distance
+    if distance < 0.0:
+        w.block[b, 2] = ENFORCED
+        w.row[r, 0] = weight * min(-gain * distance, step)
+    else:
+        w.block[b, 2] = WAITING
+
+
+@helper
+def build_directed(m, w, b, r, joint, point, axis, wanted, arm, gain, step, weight):
+    """Two rows that turn an axis towards a unit direction; ``arm`` is 1 / distance for a gaze, else 0."""
+    s = perpendicular(axis)
+    t = vec.cross(axis, s)
+    sine = vec.norm(vec.cross(axis, wanted))
+    angle = atan2(sine, vec.dot(axis, wanted))
+    scale = angle / sine if sine > 1e-9 else 1.0
+    e = (scale * vec.dot(s, wanted), scale * vec.dot(t, wanted))
+    if sine <= 1e-9 and angle > 1.0:
+        e = (angle, 0.0)  # antiparallel: any way round
+    w.block[b, 0] = angle
+    factor = RADIAN * weight * limited(angle, gain, step)
+    scaled = RADIAN * weight
+    for k in range(2):
+        along = (s, t)[k]
+        w.row[r + k, 0] = factor * e[k]
+        slip = vec.scale(scaled * arm, vec.reject(along, wanted))
+        add_row(m, w, r + k, joint, point, slip, vec.scale(scaled, vec.cross(axis, along)))
+
+
+@helper
+def build_block(m, w, index, values, b, goals, state, gain):
+    """Error, wanted change and rows of one block (``FLEXT``: the error alone; see ``build_flext``)."""
+    kind, r, t, joint = index[b, KIND], index[b, FIRST], index[b, packing.TASK], index[b, JOINT]
+    w.block[b, 0] = 0.0
+    if not known(goals, t, kind):
+        w.block[b, 2] = OFF
+        return
+    w.block[b, 2] = EQUAL
+    weight, step = values[b, packing.WEIGHT], values[b, packing.STEP]
+    goal = (goals[t, 0], goals[t, 1], goals[t, 2])
+    for k in range(index[b, packing.COUNT]):
+        clear(w.rows, r + k)
+    point = place_of(m, w, joint, triple(values, b, packing.OFFSET))
+    if kind == packing.POSITION:
+        e = vec.sub(goal, point)
+        w.block[b, 0] = vec.norm(e)
+        set_rows(w, r, e, limited(w.block[b, 0], gain, step), weight)
+        for k in range(3):
+            add_row(m, w, r + k, joint, point, vec.scale(weight, (X, Y, Z)[k]), NONE)
+    elif kind == packing.FLEXT:
+        w.block[b, 0] = vec.norm(vec.sub(goal, point))
+    elif kind == packing.TANGENTIAL:
+        e = vec.sub(goal, point)
+        u = vec.unit(vec.sub(point, vec.load(w.position, index[b, ROOT])))
+        if vec.dot(u, u) < 0.5:  # the effector is at the limb's root: no direction is radial
+            u = vec.unit(e)
+        if vec.dot(u, u) < 0.5:
+            u = Y
+        e = vec.reject(e, u)
+        factor = weight * limited(vec.norm(e), gain, step)
+        s = perpendicular(u)
+        for k in range(2):
+            along = (s, vec.cross(u, s))[k]
+            w.row[r + k, 0] = factor * vec.dot(along, e)
+            add_row(m, w, r + k, joint, point, vec.scale(weight, along), NONE)
+    elif kind == packing.DRAG:
+        root, middle, end, axis, angle = limb_of(m, w, index, values, b, state)
+        low, high = values[b, packing.LOW], values[b, packing.HIGH]
+        l1, l2, l3, sigma, alpha, wish, low, high = flext_wish(
+            root, middle, end, axis, angle, goal, NONE, NONE, low, high
+        )
+        side = values[b, packing.SIDE]
+        _, _, _, beyond = flext.solve_triangle(l1, l2, l3, sigma, alpha, wish, side, low, high)
+        u = vec.unit(vec.sub(end, root))
+        if abs(beyond) < 1e-6 or vec.dot(u, u) < 0.5:
+            w.block[b, 2] = OFF
+            return
+        w.row[r, 0] = weight * beyond * limited(abs(beyond), gain, step)
+        add_row(m, w, r, joint, point, vec.scale(weight, u), NONE)
+    elif kind == packing.ORIENTATION:
+        q = qt.normalised((goals[t, 3], goals[t, 4], goals[t, 5], goals[t, 6]))
+        here = qt.load(w.rotation, joint)
+        e = qt.log(qt.mul(q, qt.inv(here)))
+        w.block[b, 0] = vec.norm(e)
+        set_rows(w, r, e, limited(w.block[b, 0], gain, step), RADIAN * weight)
+        for k in range(3):
+            add_row(m, w, r + k, joint, point, NONE, vec.scale(RADIAN * weight, (X, Y, Z)[k]))
+    elif kind == packing.LOOK_AT or kind == packing.ALIGNMENT:
+        axis = qt.mul_vec(qt.load(w.rotation, joint), triple(values, b, packing.DIRECTION))
+        arm = 0.0
+        wanted = goal
+        if kind == packing.LOOK_AT:
+            wanted = vec.sub(goal, point)
+            arm = 1.0 / max(vec.norm(wanted), 1e-3)
+        wanted = vec.unit(wanted)
+        if vec.dot(wanted, wanted) < 0.5:
+            w.block[b, 2] = OFF
+            return
+        build_directed(m, w, b, r, joint, point, axis, wanted, arm, gain, step, weight)
+    elif kind == packing.PLANE or kind == packing.OBSTACLE:
+        q = qt.normalised((goals[t, 3], goals[t, 4], goals[t, 5], goals[t, 6]))
+        inside = qt.inv_mul_vec(q, vec.sub(point, goal))
+        found = signed_distance(index[b, packing.SHAPE], triple(values, b, packing.SIZE), inside)
+        normal = qt.mul_vec(q, (found[1], found[2], found[3]))
+        build_unilateral(w, b, r, found[0] - values[b, packing.RATIO], gain, step, weight)
+        add_row(m, w, r, joint, point, vec.scale(weight, normal), NONE)
+    elif kind == packing.BALANCE:
+        compute_masses(m, w)
+        x, z = w.mass[0, 1] / w.mass[0, 0], w.mass[0, 3] / w.mass[0, 0]
+        inner = inside_distance(w.hull, compute_hull(m, w), x, z, values[b, packing.RATIO])
+        build_unilateral(w, b, r, inner[0], gain, step, weight)
+        add_mass_row(m, w, r, (weight * inner[1], 0.0, weight * inner[2]))
+    elif kind == packing.BALANCE_POINT:
+        compute_masses(m, w)
+        e = (goal[0] - w.mass[0, 1] / w.mass[0, 0], goal[2] - w.mass[0, 3] / w.mass[0, 0])
+        w.block[b, 0] = (e[0] * e[0] + e[1] * e[1]) ** 0.5
+        factor = weight * limited(w.block[b, 0], gain, step)
+        for k in range(2):
+            w.row[r + k, 0] = factor * e[k]
+            add_mass_row(m, w, r + k, vec.scale(weight, (X, Z)[k]))
+    elif kind == packing.COUPLING:
+        build_coupling(m, w, index, values, b, state, gain, weight, step)
+
+
+@helper
+def build_coupling(m, w, index, values, b, state, gain, weight, step):
+    """Coordinates of one joint = ratio times those of another: rotation vectors, or hinge angles."""
+    r, joint, other, ratio = index[b, FIRST], index[b, JOINT], index[b, ROOT], values[b, packing.RATIO]
+    joints = len(m.parent)
+    scaled = RADIAN * weight
+    e = NONE
+    if m.kind[joint] == packing.BALL:
+        v = tangent_coordinates(qt.load(state, joint), scaled, w, r, m.start[joint])
+        u = tangent_coordinates(qt.load(state, other), -ratio * scaled, w, r, m.start[other])
+        e = vec.sub(vec.scale(ratio, u), v)
+    else:
+        for k in range(m.size[joint]):
+            w.rows[r + k, m.start[joint] + k] = scaled
+            w.rows[r + k, m.start[other] + k] = -ratio * scaled
+        e = vec.sub(vec.scale(ratio, vec.load(state, joints + 1 + other)), vec.load(state, joints + 1 + joint))
+    w.block[b, 0] = vec.norm(e)
+    factor = scaled * limited(w.block[b, 0], gain, step)
+    for k in range(index[b, packing.COUNT]):
+        w.row[r + k, 0] = factor * e[k]

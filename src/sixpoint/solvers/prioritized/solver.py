@@ -1,0 +1,370 @@
+"""Prioritized IK: any number of constraints on any articulated body, honoured in strict order.
+
+References: Baerlocher and Boulic, "An inverse kinematics architecture enforcing an arbitrary number of strict
+priority levels", The Visual Computer 20 (2004); Boulic and Raunhardt, "Integrated analytic and linearized
+inverse kinematics for precise full body interactions", MIG 2009.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sixpoint.body.dofs import Dofs
+from sixpoint.body.figure import Figure
+from sixpoint.body.motion import Motion, Pose
+from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.errors import SixpointError, TargetError, listed
+from sixpoint.kernels.jit import is_cached
+from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
+from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.prioritized.frame import solve_frames
+from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks
+from sixpoint.solvers.prioritized.model import check_tasks, lower, scratch_sizes
+from sixpoint.solvers.prioritized.packing import Settings, pack_model, pack_settings
+from sixpoint.solvers.prioritized.tasks import Task
+from sixpoint.solvers.sequential.solver import SequentialIK
+
+Array = NDArray[np.float64]
+Goals = Mapping[str, ArrayLike] | ArrayLike
+
+STATUSES = tuple(Status)
+CHUNK = 64  # frames between two reports of progress
+SHARE = 0.3  # a task that holds this much of what another needs made it give way
+
+log = logging.getLogger("sixpoint")
+
+
+class _Frames(NamedTuple):
+    """What a run over frames writes."""
+
+    rotations: Array
+    positions: Array
+    status: NDArray[np.int64]
+    residual: Array
+    iterations: NDArray[np.int64]
+    yielded: Array
+
+
+class PrioritizedIK:
+    """Prioritized Inverse Kinematics with the FLEXT constraint.
+
+    Args:
+        body: A figure, or a skeleton with ``dofs``.
+        tasks: The constraints; level 0 is the most important.
+        dofs: What may move; a figure has its own.
+        limits: Keep every joint within its limits.
+        gain: Share of the error that one iteration asks for, in (0, 1].
+        iterations: Most iterations of a frame that continues another.
+        cold_iterations: Most iterations of a frame without a previous one.
+        least_iterations: Fewest iterations of a frame.
+        max_angle: Largest turn of a joint in one iteration [rad].
+        max_shift: Largest translation of the base in one iteration [m].
+        rank_threshold: Rows shorter than this share of the longest of their level, after projection, are
+            beyond what is left to move.
+
+    Raises:
+        SixpointError: An option, a task or the body makes no sense; the message says what would.
+    """
+
+    name = "pik-flext"
+
+    def __init__(
+        self,
+        body: Figure | Skeleton,
+        tasks: Sequence[Task],
+        *,
+        dofs: Dofs | None = None,
+        limits: bool = True,
+        gain: float = 1.0,
+        iterations: int = 20,
+        cold_iterations: int = 50,
+        least_iterations: int = 1,
+        max_angle: float = 0.35,
+        max_shift: float = 0.1,
+        rank_threshold: float = 1e-4,
+    ) -> None:
+        if not 0 < gain <= 1:
+            raise SixpointError(f"the gain is a number above 0, at most 1; got {gain}")
+        if not 0 <= least_iterations <= iterations:
+            raise SixpointError("iterations are whole numbers, at least least_iterations >= 0")
+        self.body = Articulation.of(body, dofs)
+        self.tasks, self.posture = check_tasks(self.body, tasks)
+        self._lowered = lower(self.body, self.tasks, self.posture)
+        self._settings = pack_settings(
+            Settings(
+                limits,
+                gain,
+                max_angle,
+                max_shift,
+                rank_threshold,
+                0.0 if self.posture is None else self.posture.step,
+                self.posture is not None and self.posture.after,
+                iterations,
+                least_iterations,
+            )
+        )
+        self._cold_settings = self._settings.copy()
+        self._cold_settings[7] = max(iterations, cold_iterations)
+        table, integers = pack_model(self._lowered.model)
+        integers[6] = self._lowered.rows
+        low = self._lowered
+        self._arrays: tuple[Any, ...] = (table, integers, low.balls, low.index, low.values)
+        self._goal_rows = [k for k, task in enumerate(self.tasks) if task.takes_goal]
+        self._default = self._default_goals()
+        self._start = self.body.rest_state()
+        self._attractor = attractor_state(self.body, self.posture)
+        self._sizes = scratch_sizes(low)
+        self._starter: SequentialIK | None = None
+        self._restart = False
+
+    @classmethod
+    def from_targets(
+        cls,
+        figure: Figure,
+        *,
+        flext: bool = True,
+        limits: bool = True,
+        start: Literal["previous", "sequential"] = "previous",
+        tasks: Sequence[Task] | None = None,
+        **options: Any,
+    ) -> PrioritizedIK:
+        """A solver of the six points, with the default levels of ``full_body.default_tasks``.
+
+        Args:
+            figure: What to pose.
+            flext: Limbs by FLEXT tasks, else by plain position tasks.
+            limits: Keep every joint within its limits.
+            start: Begin each frame from the frame before (the first from Sequential IK), or each from
+                Sequential IK.
+            tasks: Other tasks, one goal each for the six effectors in their order.
+            **options: Those of ``PrioritizedIK``.
+        """
+        if start not in ("previous", "sequential"):
+            raise SixpointError(f"start is 'previous' or 'sequential', got {start!r}")
+        solver = cls(figure, tasks or default_tasks(flext), limits=limits, **options)
+        if len(solver._goal_rows) != len(EFFECTORS):
+            raise SixpointError(f"the six points need six tasks with a goal, got {len(solver._goal_rows)}")
+        solver._starter = SequentialIK(figure, limits=limits)
+        solver._restart = start == "sequential"
+        return solver
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that is posed."""
+        if self.body.figure is None:
+            raise SixpointError("this solver poses a plain skeleton, which is no figure")
+        return self.body.figure
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the tasks, in the order of residuals."""
+        return tuple(task.label for task in self.tasks)
+
+    @property
+    def goal_names(self) -> tuple[str, ...]:
+        """Names of the tasks that take a goal, in the order of an array of goals."""
+        return tuple(self.tasks[k].label for k in self._goal_rows)
+
+    # --- goals -----------------------------------------------------------------------------------
+
+    def _default_goals(self) -> Array:
+        goals = np.zeros((len(self.tasks), 7))
+        goals[:, 6] = 1.0
+        for k in self._goal_rows:
+            goals[k] = np.nan
+            if self.tasks[k].goal is not None:
+                _write_goal(goals[k], self.tasks[k].goal, self.tasks[k].label)
+        return goals
+
+    def compute_goals(self, goals: Goals) -> Array:
+        """One frame of goals as (T, 7): position and rotation of every task, NaN where it is off.
+
+        Args:
+            goals: Name -> position (3,), rotation (4,) or both (7,); names left out keep the task's own
+                goal, or are off. Or an array (G, 3) or (G, 7), a row per name in ``goal_names``.
+
+        Raises:
+            TargetError: An unknown name, or a wrong shape; the message lists names or shapes.
+        """
+        out = self._default.copy()
+        if isinstance(goals, Mapping):
+            for name, value in goals.items():
+                if name not in self.goal_names:
+                    raise TargetError(f"no task named {name!r} takes a goal; there are: {listed(self.goal_names)}")
+                _write_goal(out[self._goal_rows[self.goal_names.index(name)]], value, name)
+            return out
+        try:
+            rows = np.asarray(goals, float)
+        except (TypeError, ValueError):
+            rows = np.zeros(0)
+        count = len(self._goal_rows)
+        if rows.shape not in ((count, 3), (count, 7)):
+            raise TargetError(
+                f"goals must be numbers ({count}, 3) or ({count}, 7), NaN where unknown: one row each for "
+                f"{listed(self.goal_names)}; got {getattr(goals, 'shape', type(goals).__name__)}"
+            )
+        out[self._goal_rows, : rows.shape[1]] = rows
+        return out
+
+    # --- solving ---------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        goals: Goals,
+        previous: Solution | None = None,
+        dt: float = 1 / 60,
+        *,
+        start: Pose | None = None,
+        posture: Pose | None = None,
+    ) -> Solution:
+        """Pose the body for one frame.
+
+        Args:
+            goals: See ``compute_goals``. Of a solver made by ``from_targets``: (6, 3) points [m].
+            previous: The solution of the frame before, if any.
+            dt: Not used: a step is as long as the goals ask for.
+            start: Pose to begin from, instead of the previous one.
+            posture: Pose that the posture task is drawn to in this frame.
+
+        Raises:
+            TargetError: The goals have another shape or unknown names.
+            SixpointError: ``previous``, ``start`` or ``posture`` is of another body.
+        """
+        frame = self.compute_goals(goals)
+        if start is None and self._starter is not None and (previous is None or self._restart):
+            start = self._starter.solve(frame[:, :3], None).pose
+        state = self.body.state_of(start) if start is not None else self._state_after(previous)
+        settings = self._cold_settings if previous is None and start is None else self._settings
+        attractor = self._attractor if posture is None else self.body.state_of(posture)
+        out = self._run(frame[None], np.empty((0, *state.shape)), state, attractor, settings, explain=True)
+        moving, translations = self.body.place_base(out.rotations, out.positions)
+        pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)
+        status = STATUSES[out.status[0]]
+        gave_way = {} if status is Status.CONVERGED else self._gave_way(out.yielded[0])
+        return Solution(pose, status, out.residual[0], int(out.iterations[0]), (state,), gave_way)
+
+    def solve_frames(self, targets: Targets | Array, progress: Progress | None = None) -> MotionSolution:
+        """Pose the body for every frame.
+
+        Args:
+            targets: The six points of a solver made by ``from_targets``, or goals (F, G, 3) or (F, G, 7) at
+                60 Hz, a row per name in ``goal_names``.
+            progress: Called with the number of frames done.
+        """
+        if isinstance(targets, Targets):
+            positions, rate, name = targets.positions, targets.rate, targets.name
+        else:
+            positions, rate, name = np.asarray(targets, float), 60.0, "prioritized"
+        goals = self._goals_of_frames(positions)
+        starts = np.empty((0, *self._start.shape))
+        if self._starter is not None and isinstance(targets, Targets):
+            starts = self._sequential_starts(targets if self._restart else targets.sliced(slice(1)))
+        state = self._start.copy()
+        frames = len(goals)
+        parts = []
+        step = CHUNK if progress else frames
+        for first in range(0, frames, step):
+            part = slice(first, min(first + step, frames))
+            settings = self._cold_settings if first == 0 and not len(starts) else self._settings
+            parts.append(self._run(goals[part], starts[part], state, self._attractor, settings))
+            if progress:
+                progress(part.stop)
+        out = _Frames(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        moving, translations = self.body.place_base(out.rotations, out.positions)
+        out.rotations.flags.writeable = False  # hand over instead of copying
+        motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
+        return MotionSolution(motion, out.status, out.residual)
+
+    def solve_motion(self, targets: Targets) -> Motion:
+        """Pose the body for every frame."""
+        return self.solve_frames(targets).motion
+
+    def warm_up(self) -> None:
+        """Compile the kernels, or load them from disk, on the rest pose."""
+        if not is_cached("prioritized"):
+            log.warning("compiling kernels, once (about half a minute)")
+        state = self._start.copy()
+        self._run(self._default[None], np.empty((0, *state.shape)), state, self._attractor, self._settings)
+        if self._starter is not None:
+            self._starter.warm_up()
+
+    def _goals_of_frames(self, positions: Array) -> Array:
+        count = len(self._goal_rows)
+        if positions.ndim != 3 or len(positions) == 0 or positions.shape[1:] not in ((count, 3), (count, 7)):
+            raise TargetError(
+                f"goals must be (frames, {count}, 3) or (frames, {count}, 7), a row each for "
+                f"{listed(self.goal_names)}; got {positions.shape}"
+            )
+        goals = np.tile(self._default, (len(positions), 1, 1))
+        goals[:, self._goal_rows, : positions.shape[2]] = positions
+        return goals
+
+    def _sequential_starts(self, targets: Targets) -> Array:
+        """States (F, 2 J + 1, 4) of the Sequential IK solutions."""
+        assert self._starter is not None
+        motion = self._starter.solve_motion(targets)
+        return self.body.states_of(motion.rotations, motion.positions[:, self.body.base])
+
+    def _run(
+        self,
+        goals: Array,
+        starts: Array,
+        state: Array,
+        attractor: Array,
+        settings: Array,
+        explain: bool = False,
+    ) -> _Frames:
+        """Solve frames of goals (F, T, 7); the state is changed to that after the last."""
+        frames, joints, tasks = len(goals), len(self.body.tree), len(self.tasks)
+        out = _Frames(
+            np.empty((frames, joints, 4)),
+            np.empty((frames, 3)),
+            np.empty(frames, np.int64),
+            np.empty((frames, tasks)),
+            np.empty(frames, np.int64),
+            np.zeros((frames if explain else 0, tasks, tasks + 1)),
+        )
+        scratch = (*(np.empty(size) for size in self._sizes[:4]), np.zeros(self._sizes[4], np.int64))
+        solve_frames(*self._arrays, settings, goals, starts, state, attractor, *scratch, *out)
+        return out
+
+    def _state_after(self, previous: Solution | None) -> Array:
+        if previous is None:
+            return self._start.copy()
+        if previous.pose.skeleton is not self.body.rig or previous.state[0].shape != self._start.shape:
+            raise SixpointError("previous is of another body or method; begin with previous=None")
+        return previous.state[0].copy()
+
+    def _gave_way(self, shares: Array) -> dict[str, tuple[str, ...]]:
+        """Unmet task -> what holds the motion it needs."""
+        names = (*self.names, "joint limits")
+        found = {name: np.flatnonzero(row > SHARE) for name, row in zip(names, shares, strict=False)}
+        return {name: tuple(names[k] for k in held) for name, held in found.items() if len(held)}
+
+
+def _write_goal(row: Array, value: ArrayLike | None, name: str) -> None:
+    """Write a position (3,), a rotation (4,) or both (7,) into a row of seven."""
+    try:
+        goal = np.asarray(value, float)
+    except (TypeError, ValueError):
+        goal = np.zeros(0)
+    if goal.shape not in ((3,), (4,), (7,)):
+        raise TargetError(
+            f"the goal of {name!r} is a position (3,), a rotation (4,) or both (7,); got {goal.shape}"
+        )
+    if len(goal) == 3:
+        row[:3] = goal
+        if np.isnan(row[3:]).any():
+            row[3:] = 0.0, 0.0, 0.0, 1.0
+    elif len(goal) == 4:
+        row[3:] = goal
+        if np.isnan(row[:3]).any():
+            row[:3] = 0.0
+    else:
+        row[:] = goal

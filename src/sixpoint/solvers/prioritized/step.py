@@ -1,0 +1,109 @@
+"""One prioritized step: the levels in order, each in what the levels above leave free.
+
+The null-space projector is kept as an orthonormal basis V of what is taken, P = P0 (I - V^T V); P0 removes
+the locked coordinates. The solution of a level is damped, the projector never is.
+
+Reference: Baerlocher and Boulic 2004; Boulic and Raunhardt 2009, section 4 and eq. 3.
+"""
+
+from math import sqrt
+
+from sixpoint.kernels import linear
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import helper
+from sixpoint.solvers.prioritized import packing
+from sixpoint.solvers.prioritized.packing import BALL
+from sixpoint.solvers.prioritized.rows import ENFORCED, EQUAL, build_flext
+
+
+@helper
+def mask(m, w, i):
+    """Remove the locked coordinates from row i."""
+    for c in range(len(m.hinges)):
+        if w.locked[c]:
+            w.rows[i, c] = 0.0
+    for j in range(len(m.parent)):
+        start = m.start[j]
+        for k in range(w.locks[j]):
+            u = vec.load(w.lock, 2 * j + k)
+            part = u[0] * w.rows[i, start] + u[1] * w.rows[i, start + 1] + u[2] * w.rows[i, start + 2]
+            for c in range(3):
+                w.rows[i, start + c] -= part * u[c]
+
+
+@helper
+def take_level(m, w, index, values, level, goals, state, settings, step, work, basis, size):
+    """Solve one level inside the null space of those above; returns the new size of the basis."""
+    first, count = int(m.levels[level, 0]), int(m.levels[level, 1])
+    used, longest = 0, 0.0
+    capacity = w.small.shape[1]
+    right, answer = w.small.shape[0] - 2, w.small.shape[0] - 1
+    for b in range(first, first + count):
+        if w.block[b, 2] != EQUAL and w.block[b, 2] != ENFORCED:
+            continue
+        r = index[b, packing.FIRST]
+        special = index[b, packing.KIND] == packing.FLEXT
+        if special:
+            t = index[b, packing.TASK]
+            goal = (goals[t, 0], goals[t, 1], goals[t, 2])
+            build_flext(m, w, index, values, b, goal, state, settings.gain, step)
+        for k in range(index[b, packing.COUNT]):
+            i = work + used
+            linear.copy(w.rows, i, r + k)
+            longest = max(longest, linear.dot(w.rows, i, i))
+            left = w.row[r + k, 0]
+            if not special:
+                left -= linear.dot(w.rows, r + k, step)
+            w.small[right, used] = left
+            mask(m, w, i)
+            if special and linear.dot(w.rows, i, i) < 0.25:
+                continue  # the hinge is at its limit: the root alone does not change the limb's length
+            used += 1
+    if used == 0 or used > capacity:
+        return size
+    threshold = max(1e-6, settings.rank * sqrt(longest))
+    rank = linear.extend_basis(w.rows, work, used, basis, size, w.small, threshold)
+    if rank == 0:
+        return size
+    linear.solve_damped(w.small, used, rank, right, answer, m.levels[level, 2], threshold)
+    for k in range(rank):
+        linear.add(w.rows, step, w.small[answer, k], basis + size + k)
+    return size + rank
+
+
+@helper
+def prioritized_step(m, w, index, values, goals, state, settings, fixed, step, posture, work, basis):
+    """Coordinate changes of all levels and of the posture into row ``step``."""
+    linear.copy(w.rows, step, fixed)
+    size = 0
+    for level in range(len(m.levels)):
+        size = take_level(m, w, index, values, level, goals, state, settings, step, work, basis, size)
+    if posture >= 0:
+        linear.copy(w.rows, work, posture)
+        mask(m, w, work)
+        linear.reject(w.rows, work, basis, basis + size)
+        linear.add(w.rows, step, 1.0, work)
+    return size
+
+
+@helper
+def scale_step(m, w, settings, step):
+    """Shorten the whole step so that no angle and no translation exceeds its cap."""
+    angle, shift = 0.0, 0.0
+    first = 3 if m.free else 0
+    for c in range(first, len(m.hinges)):
+        angle = max(angle, abs(w.rows[step, c]))
+    for j in range(len(m.parent)):
+        if m.kind[j] == BALL:
+            s = m.start[j]
+            angle = max(angle, vec.norm((w.rows[step, s], w.rows[step, s + 1], w.rows[step, s + 2])))
+    if m.free:
+        shift = vec.norm((w.rows[step, 0], w.rows[step, 1], w.rows[step, 2]))
+    factor = 1.0
+    if angle > settings.max_angle:
+        factor = settings.max_angle / angle
+    if shift * factor > settings.max_shift:
+        factor = settings.max_shift / shift
+    if factor < 1.0:
+        for c in range(len(m.hinges)):
+            w.rows[step, c] *= factor

@@ -1,0 +1,80 @@
+"""Why a task was not met: which more important tasks, or limits, hold the motion it would need."""
+
+from sixpoint.kernels import linear
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import helper
+from sixpoint.solvers.prioritized import packing
+from sixpoint.solvers.prioritized.kinematics import add_row, place_of
+from sixpoint.solvers.prioritized.rows import EQUAL, ENFORCED, NONE, X, Y, Z, triple
+from sixpoint.solvers.prioritized.step import mask
+
+
+@helper
+def _own_rows(m, w, index, values, b, work):
+    """Write what a block occupies into the work rows; returns how many. FLEXT occupies its whole position."""
+    kind, first, count = index[b, packing.KIND], index[b, packing.FIRST], index[b, packing.COUNT]
+    if kind == packing.FLEXT:
+        joint = index[b, packing.JOINT]
+        point = place_of(m, w, joint, triple(values, b, packing.OFFSET))
+        for k in range(3):
+            linear.clear(w.rows, work + k)
+            saved = (X, Y, Z)[k]
+            add_row(m, w, work + k, joint, point, saved, NONE)
+        return 3
+    for k in range(count):
+        linear.copy(w.rows, work + k, first + k)
+    return count
+
+
+@helper
+def _wanted(m, w, index, values, b, goals, wish):
+    """Coordinate changes that an unmet block asks for (its rows transposed times its error), normalised."""
+    linear.clear(w.rows, wish)
+    if index[b, packing.KIND] == packing.FLEXT:
+        joint, t = index[b, packing.JOINT], index[b, packing.TASK]
+        point = place_of(m, w, joint, triple(values, b, packing.OFFSET))
+        gap = vec.sub((goals[t, 0], goals[t, 1], goals[t, 2]), point)
+        add_row(m, w, wish, joint, point, vec.unit(gap), NONE)
+    else:
+        r = index[b, packing.FIRST]
+        for k in range(index[b, packing.COUNT]):
+            linear.add(w.rows, wish, w.row[r + k, 0], r + k)
+    length = linear.dot(w.rows, wish, wish) ** 0.5
+    if length < 1e-12:
+        return False
+    for c in range(w.rows.shape[1]):
+        w.rows[wish, c] /= length
+    return True
+
+
+@helper
+def report_yielding(m, w, index, values, goals, fixed, yielded):
+    """Shares (T, T + 1): how much of what each unmet task needs is held by each other task; limits last.
+
+    A share is the squared part of the wanted direction that lies in the row space of the other task.
+    """
+    wish, work = fixed + 1, fixed + 3
+    basis = work + w.small.shape[1]
+    tasks = yielded.shape[0]
+    for b in range(len(index)):
+        active = w.block[b, 2] == EQUAL or w.block[b, 2] == ENFORCED
+        if not active or w.block[b, 0] <= values[b, packing.ACCEPT]:
+            continue
+        if not _wanted(m, w, index, values, b, goals, wish):
+            continue
+        t = index[b, packing.TASK]
+        linear.copy(w.rows, work, wish)
+        mask(m, w, work)
+        left = linear.dot(w.rows, work, work)
+        yielded[t, tasks] = max(yielded[t, tasks], 1.0 - left)
+        for other in range(len(index)):
+            s = index[other, packing.TASK]
+            held = w.block[other, 2] == EQUAL or w.block[other, 2] == ENFORCED
+            if s == t or not held or index[other, packing.LEVEL] > index[b, packing.LEVEL]:
+                continue
+            count = _own_rows(m, w, index, values, other, work)
+            rank = linear.extend_basis(w.rows, work, count, basis, 0, w.small, 1e-6)
+            share = 0.0
+            for k in range(rank):
+                share += linear.dot(w.rows, wish, basis + k) ** 2
+            yielded[t, s] = max(yielded[t, s], share)
