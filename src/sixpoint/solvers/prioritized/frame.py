@@ -25,8 +25,8 @@ def evaluate(m, w, index, values, goals, state, settings):
 
 
 @helper
-def total_errors(m, w, index, totals):
-    """Summed error of each level [m] in ``totals``; returns their sum."""
+def total_errors(m, w, index, values, totals):
+    """Write what errors exceed their tolerances by, summed per level [m]; return the sum of all errors."""
     everything = 0.0
     for level in range(len(m.levels)):
         totals[level] = 0.0
@@ -36,9 +36,9 @@ def total_errors(m, w, index, totals):
         kind = index[b, packing.KIND]
         angular = kind == packing.ORIENTATION or kind == packing.LOOK_AT
         angular = angular or kind == packing.ALIGNMENT or kind == packing.COUPLING
-        error = w.block[b, 0] * (RADIAN if angular else 1.0)
-        totals[index[b, packing.LEVEL]] += error
-        everything += error
+        scale = RADIAN if angular else 1.0
+        totals[index[b, packing.LEVEL]] += scale * max(w.block[b, 0] - values[b, packing.TOLERANCE], 0.0)
+        everything += scale * w.block[b, 0]
     return everything
 
 
@@ -120,7 +120,7 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     iterations = 0
     while True:
         evaluate(m, w, index, values, goals, state, settings)
-        everything = total_errors(m, w, index, totals)
+        everything = total_errors(m, w, index, values, totals)
         if is_better(totals, least, levels):
             for i in range(2 * joints + 1):
                 for k in range(4):
@@ -134,7 +134,7 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             break
         history = (history[1], history[2], everything)
         posture = -1
-        if settings.posture_step > 0.0 and (met or not settings.posture_after):
+        if settings.posture_step > 0.0 and (met if settings.posture_after else iterations < settings.drift):
             posture = fixed + 2
             posture_wish(m, w, state, attractor, settings.posture_step, posture)
         limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)

@@ -130,16 +130,17 @@ class Settings(NamedTuple):
     posture_after: bool
     most: int
     least: int
+    drift: int
 
 
 def pack_settings(settings):
-    """Settings as nine numbers."""
+    """Settings as ten numbers."""
     return np.array([float(value) for value in settings])
 
 
 @helper
 def unpack_settings(options):
-    """Settings from nine numbers."""
+    """Settings from ten numbers."""
     return Settings(
         options[0] > 0.0,
         options[1],
@@ -150,6 +151,7 @@ def unpack_settings(options):
         options[6] > 0.0,
         int(options[7]),
         int(options[8]),
+        int(options[9]),
     )
 
 

@@ -107,10 +107,12 @@ class PrioritizedIK:
                 self.posture is not None and self.posture.after,
                 iterations,
                 least_iterations,
+                1,
             )
         )
         self._cold_settings = self._settings.copy()
         self._cold_settings[7] = max(iterations, cold_iterations)
+        self._cold_settings[9] = max(iterations, cold_iterations) // 2
         table, integers = pack_model(self._lowered.model)
         integers[6] = self._lowered.rows
         low = self._lowered
