@@ -123,6 +123,22 @@ class Figure:
         """The same figure with other joint limits."""
         return replace(self, dofs=self._compute_dofs(limits))
 
+    def full_dofs(self, limits: Limits | None = None) -> Dofs:
+        """The figure's degrees of freedom with those of forearms, wrists and ankles.
+
+        Six positions say nothing about these; tasks on hands and feet need them.
+
+        Args:
+            limits: Ranges of the added joints; the shipped table by default.
+        """
+        limits = limits or Limits.default()
+        joints = dict(self.dofs.joints)
+        for k, side in enumerate((1.0, -1.0)):
+            joints[self.roles.elbow[k]] = limits.forearm(side)
+            joints[self.roles.wrist[k]] = limits.wrist(side)
+            joints[self.roles.ankle[k]] = limits.ankle(side)
+        return Dofs(joints)
+
     def _compute_dofs(self, limits: Limits) -> Dofs:
         joints: dict[int, JointDof] = {self.roles.pelvis: Ball()}
         for joint, ball in zip(self.roles.spine, limits.spine(self._spine_heights()), strict=True):

@@ -65,6 +65,9 @@ class Limits:
             self.shoulder(side)
             self.hip(side)
             self.clavicle(side * X, side)
+            self.forearm(side)
+            self.wrist(side)
+            self.ankle(side)
         for hinge in (self.elbow(), self.knee()):
             if not -np.pi <= hinge.lower[0] <= hinge.upper[0] <= np.pi:
                 raise ValueError("flexion is two numbers between -180 and 180 degrees, the smaller first")
@@ -109,6 +112,37 @@ class Limits:
         least, most = np.radians(self.table["knee"]["flexion"])
         return Hinges(X, least, most)
 
+    def forearm(self, side: float) -> Hinges:
+        """Elbow with the twist of the forearm: flexion about +X, then pronation about the bone."""
+        flexion, entry = self.elbow(), self._extremity("forearm")
+        # The palm turns backward in pronation: about +Y that is negative on the left, positive on the right.
+        inward, outward = np.radians([entry["pronation"], entry["supination"]])
+        low, high = (-inward, outward) if side > 0 else (-outward, inward)
+        return _two_hinges(X, Y, (flexion.lower[0], flexion.upper[0]), (low, high))
+
+    def wrist(self, side: float) -> Hinges:
+        """Flexion towards the palm (about Z), then deviation towards the thumb (negative about +X)."""
+        entry = self._extremity("wrist")
+        flexion, extension, radial, ulnar = np.radians(
+            [entry[name] for name in ("flexion", "extension", "radial", "ulnar")]
+        )
+        low, high = (-flexion, extension) if side > 0 else (-extension, flexion)
+        return _two_hinges(Z, X, (low, high), (-radial, ulnar))
+
+    def ankle(self, side: float) -> Hinges:
+        """Dorsiflexion (negative about +X), then inversion: the sole turns inward."""
+        entry = self._extremity("ankle")
+        dorsal, plantar, inner, outer = np.radians(
+            [entry[name] for name in ("dorsiflexion", "plantarflexion", "inversion", "eversion")]
+        )
+        low, high = (-inner, outer) if side > 0 else (-outer, inner)
+        return _two_hinges(X, Z, (-dorsal, plantar), (low, high))
+
+    def _extremity(self, role: str) -> Mapping[str, float]:
+        """Ranges that a user's table may leave to the shipped one."""
+        entry: Mapping[str, float] = self.table.get(role) or read_shipped("joint_limits.toml")[role]
+        return entry
+
     def spine(self, heights: list[float] | Array) -> list[Ball]:
         """Limits of a spine of any number of joints.
 
@@ -148,3 +182,10 @@ class Limits:
     def _ball(self, knots: Any, axis: Array, forward: Array, side: Array, twist: tuple[float, float]) -> Ball:
         theta, psi = np.radians(np.asarray(knots, float)).T
         return Ball(SwingTwist(axis, forward, side, theta, psi, np.array(twist)))
+
+
+def _two_hinges(
+    first: Array, second: Array, first_range: tuple[float, float], second_range: tuple[float, float]
+) -> Hinges:
+    ranges = np.array([first_range, second_range])
+    return Hinges(np.array([first, second]), ranges[:, 0], ranges[:, 1])

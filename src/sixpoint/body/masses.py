@@ -5,6 +5,8 @@ Reference: Winter, "Biomechanics and Motor Control of Human Movement", after Dem
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,7 +54,7 @@ def segment_masses(figure: Figure) -> Array:
 def _spread_trunk(figure: Figure, masses: Array, share: float) -> None:
     """The trunk's mass on pelvis and spine joints below the head, by the length of the segment above each."""
     chain = (figure.roles.pelvis, *figure.roles.spine)
-    steps = [figure.offset_between(a, b) for a, b in zip(chain, chain[1:], strict=False)]
+    steps = [figure.offset_between(a, b) for a, b in pairwise(chain)]
     lengths = np.linalg.norm(steps, axis=1)
     for joint, step, length in zip(chain, steps, lengths, strict=False):
         part = share * length / max(lengths.sum(), 1e-9)

@@ -1,7 +1,8 @@
 """The decorators of compiled code, and where its machine code is kept.
 
 ``helper`` marks a function called from other compiled code; without compilation it stays plain Python,
-so it can be tested and debugged as such. ``algebra`` is a helper for sums over rows. ``entry`` marks the few functions called from Python.
+so it can be tested and debugged as such. ``algebra`` is a helper for sums over rows. ``entry`` marks the few
+functions called from Python.
 
 Numba does not notice an edit to a callee in another file, so the cache folder is named by a hash of all
 compiled sources. Where no folder can be written, code is compiled anew in each process.

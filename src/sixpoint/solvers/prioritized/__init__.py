@@ -1,5 +1,5 @@
 """Prioritized IK with the FLEXT constraint.
 
-``tasks`` is what users write; ``model`` with ``blocks`` and ``limbs`` lowers it; ``frame`` is the compiled loop over
-``rows`` (errors and Jacobians), ``step`` (levels), ``limits``; ``solver`` is the public class.
+``tasks`` is what users write, ``blocks`` and ``limbs`` lower tasks, ``model`` a body; ``engine`` is compiled;
+``solver`` is the public class.
 """

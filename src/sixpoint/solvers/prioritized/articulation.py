@@ -54,7 +54,9 @@ class Articulation:
             tree = replace(body.skeleton, offsets=body.offsets)
             out = cls(body.skeleton, tree, dofs or body.dofs, body.neutral, body.roles.pelvis, body)
         elif dofs is None:
-            raise SixpointError("a skeleton needs dofs=Dofs({joint: Hinges(...) or Ball(...)}); a figure has its own")
+            raise SixpointError(
+                "a skeleton needs dofs=Dofs({joint: Hinges(...) or Ball(...)}); a figure has its own"
+            )
         else:
             identity = np.tile(rot.IDENTITY, (len(body), 1))
             out = cls(body, body, dofs, identity, 0, None)

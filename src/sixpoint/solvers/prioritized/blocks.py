@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sixpoint.body.dofs import Ball, Hinges
 from sixpoint.errors import SixpointError
 from sixpoint.kernels import distance
-from sixpoint.solvers.prioritized import packing
 from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.limbs import find_limb
 from sixpoint.solvers.prioritized.tasks import (
     AlignTask,
@@ -87,7 +87,7 @@ def _direction(task: Task, axis: object) -> Array:
     length = np.linalg.norm(vector)
     if vector.shape != (3,) or not 1e-9 < length < np.inf:
         raise SixpointError(f"{task.label}: the axis is three numbers, not all zero; got {axis}")
-    return vector / length
+    return np.asarray(vector / length)
 
 
 def _reach(body: Articulation, joint: int, offset: Array) -> float:
@@ -118,9 +118,7 @@ def lower_task(body: Articulation, task: Task, k: int) -> list[Block]:
             kind = packing.LOOK_AT if isinstance(task, LookAtTask) else packing.ALIGNMENT
             joint, offset = _point(body, task.at, task.offset)
             axis = _direction(task, task.axis)
-            return [
-                _block(kind, task, k, 2, joint, task.level, ROTATION_STEP, offset=offset, direction=axis)
-            ]
+            return [_block(kind, task, k, 2, joint, task.level, ROTATION_STEP, offset=offset, direction=axis)]
         case PlaneTask():
             joint, offset = _point(body, task.at, task.offset)
             return [_avoidance(body, packing.PLANE, task, k, joint, offset, HalfSpace(), task.margin, 0.0)]

@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 X, Z = np.eye(3)[[0, 2]]
 
 ELBOW, SHOULDER_BACK, SHOULDER_OUT, KNEE, HIP = np.radians([20.0, 10.0, 10.0, 15.0, 8.0])
-"""Relaxed standing: "elbows slightly bent and backward, knees slightly bent and forward" (Unzueta et al. 2008)."""
+"""Relaxed standing: "elbows slightly bent and backward, knees slightly bent and forward".
+
+Reference: Unzueta et al. 2008, section 9, of their prioritized IK.
+"""
 
 
 def default_tasks(flext: bool = True) -> list[Task]:

@@ -44,9 +44,7 @@ def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) ->
         if not isinstance(body.dofs[middle], Hinges):
             raise SixpointError(f"{task.label}: the middle joint {task.middle!r} is not a hinge")
     else:
-        hinges = [
-            j for j in path if isinstance(body.dofs[j], Hinges) and _lever(body, j, point) > SHORT
-        ]
+        hinges = [j for j in path if isinstance(body.dofs[j], Hinges) and _lever(body, j, point) > SHORT]
         if not hinges:
             raise SixpointError(f"{task.label}: FLEXT needs a hinge between {task.at!r} and the limb's root")
         middle = hinges[-1]
@@ -54,7 +52,9 @@ def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) ->
     if task.root is not None:
         root = _named(body, task, task.root, above)
     else:
-        moving = [j for j in above if body.dofs[j].size and _lever(body, middle, body.rest_positions[j]) > SHORT]
+        moving = [
+            j for j in above if body.dofs[j].size and _lever(body, middle, body.rest_positions[j]) > SHORT
+        ]
         if not moving:
             raise SixpointError(f"{task.label}: no joint above {body.tree.names[middle]!r} can turn the limb")
         root = moving[-1]

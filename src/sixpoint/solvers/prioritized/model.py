@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.dofs import Ball, Hinges
+from sixpoint.body.dofs import Ball, Hinges, SwingTwist
 from sixpoint.errors import SixpointError, listed
 from sixpoint.kernels.swing_twist import build_ball_rows
-from sixpoint.solvers.prioritized import packing
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.blocks import Block, lower_task
-from sixpoint.solvers.prioritized.packing import BALL, FIXED, HINGES, Model
+from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.packing import BALL, FIXED, HINGES, Model
 from sixpoint.solvers.prioritized.tasks import BalanceTask, FlextTask, PostureTask, Task
 
 Array = NDArray[np.float64]
@@ -76,7 +76,8 @@ def _lower_body(
     column = 3 if body.dofs.free_root else 0
     kind, start, size = (np.zeros(joints, np.int64) for _ in range(3))
     ball = np.full(joints, -1, np.int64)
-    limits, hinges, bounds = [], np.zeros((column, 4)), np.zeros((column, 4))
+    limits: list[SwingTwist | None] = []
+    hinges, bounds = np.zeros((column, 4)), np.zeros((column, 4))
     bounds[:, :2] = -np.inf, np.inf
     for j in range(joints):
         dof = body.dofs[j]
@@ -150,8 +151,7 @@ def support_of(body: Articulation, task: BalanceTask) -> list[tuple[int, Array]]
         foot = body.tree.subtree(ankle)
         out += [(int(j), np.zeros(3)) for j in foot[1:]]
         out += [
-            body.place(body.tree.site_names[s])
-            for s in np.flatnonzero(np.isin(body.tree.site_parents, foot))
+            body.place(body.tree.site_names[s]) for s in np.flatnonzero(np.isin(body.tree.site_parents, foot))
         ]
         if len(foot) == 1:
             out.append((int(ankle), np.zeros(3)))
@@ -193,7 +193,7 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
     twice = [name for name, count in names.items() if count > 1]
     if twice:
         raise SixpointError(
-            f"more than one task named {listed(twice)}: two tasks at one place need name=... to tell them apart"
+            f"more than one task named {listed(twice)}: two tasks at one place need a name=... each"
         )
     for task in tasks:
         levels = [task.level]

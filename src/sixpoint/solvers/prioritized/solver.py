@@ -8,31 +8,31 @@ inverse kinematics for precise full body interactions", MIG 2009.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
-from sixpoint.errors import SixpointError, TargetError, listed
+from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.prioritized.articulation import Articulation
-from sixpoint.solvers.prioritized.frame import solve_frames
+from sixpoint.solvers.prioritized.engine.frame import solve_frames
+from sixpoint.solvers.prioritized.engine.packing import Settings, pack_model, pack_settings
 from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks
+from sixpoint.solvers.prioritized.goals import Goals, GoalTable
+from sixpoint.solvers.prioritized.linear_step import LinearStep, read_step
 from sixpoint.solvers.prioritized.model import check_tasks, lower, scratch_sizes
-from sixpoint.solvers.prioritized.packing import Settings, pack_model, pack_settings
 from sixpoint.solvers.prioritized.tasks import Task
 from sixpoint.solvers.sequential.solver import SequentialIK
 
 Array = NDArray[np.float64]
-Goals = Mapping[str, ArrayLike] | ArrayLike
-
 STATUSES = tuple(Status)
 CHUNK = 64  # frames between two reports of progress
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
@@ -71,8 +71,6 @@ class PrioritizedIK:
     Raises:
         SixpointError: An option, a task or the body makes no sense; the message says what would.
     """
-
-    name = "pik-flext"
 
     def __init__(
         self,
@@ -117,8 +115,7 @@ class PrioritizedIK:
         integers[6] = self._lowered.rows
         low = self._lowered
         self._arrays: tuple[Any, ...] = (table, integers, low.balls, low.index, low.values)
-        self._goal_rows = [k for k, task in enumerate(self.tasks) if task.takes_goal]
-        self._default = self._default_goals()
+        self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
         self._attractor = attractor_state(self.body, self.posture)
         self._sizes = scratch_sizes(low)
@@ -150,8 +147,8 @@ class PrioritizedIK:
         if start not in ("previous", "sequential"):
             raise SixpointError(f"start is 'previous' or 'sequential', got {start!r}")
         solver = cls(figure, tasks or default_tasks(flext), limits=limits, **options)
-        if len(solver._goal_rows) != len(EFFECTORS):
-            raise SixpointError(f"the six points need six tasks with a goal, got {len(solver._goal_rows)}")
+        if len(solver.goal_names) != len(EFFECTORS):
+            raise SixpointError(f"the six points need six tasks with a goal, got {len(solver.goal_names)}")
         solver._starter = SequentialIK(figure, limits=limits)
         solver._restart = start == "sequential"
         return solver
@@ -171,18 +168,7 @@ class PrioritizedIK:
     @property
     def goal_names(self) -> tuple[str, ...]:
         """Names of the tasks that take a goal, in the order of an array of goals."""
-        return tuple(self.tasks[k].label for k in self._goal_rows)
-
-    # --- goals -----------------------------------------------------------------------------------
-
-    def _default_goals(self) -> Array:
-        goals = np.zeros((len(self.tasks), 7))
-        goals[:, 6] = 1.0
-        for k in self._goal_rows:
-            goals[k] = np.nan
-            if self.tasks[k].goal is not None:
-                _write_goal(goals[k], self.tasks[k].goal, self.tasks[k].label)
-        return goals
+        return self._goals.names
 
     def compute_goals(self, goals: Goals) -> Array:
         """One frame of goals as (T, 7): position and rotation of every task, NaN where it is off.
@@ -194,25 +180,7 @@ class PrioritizedIK:
         Raises:
             TargetError: An unknown name, or a wrong shape; the message lists names or shapes.
         """
-        out = self._default.copy()
-        if isinstance(goals, Mapping):
-            for name, value in goals.items():
-                if name not in self.goal_names:
-                    raise TargetError(f"no task named {name!r} takes a goal; there are: {listed(self.goal_names)}")
-                _write_goal(out[self._goal_rows[self.goal_names.index(name)]], value, name)
-            return out
-        try:
-            rows = np.asarray(goals, float)
-        except (TypeError, ValueError):
-            rows = np.zeros(0)
-        count = len(self._goal_rows)
-        if rows.shape not in ((count, 3), (count, 7)):
-            raise TargetError(
-                f"goals must be numbers ({count}, 3) or ({count}, 7), NaN where unknown: one row each for "
-                f"{listed(self.goal_names)}; got {getattr(goals, 'shape', type(goals).__name__)}"
-            )
-        out[self._goal_rows, : rows.shape[1]] = rows
-        return out
+        return self._goals.compute(goals)
 
     # --- solving ---------------------------------------------------------------------------------
 
@@ -251,6 +219,24 @@ class PrioritizedIK:
         gave_way = {} if status is Status.CONVERGED else self._gave_way(out.yielded[0])
         return Solution(pose, status, out.residual[0], int(out.iterations[0]), (state,), gave_way)
 
+    def compute_step(
+        self, goals: Goals, previous: Solution | None = None, *, start: Pose | None = None
+    ) -> LinearStep:
+        """The linear problem and its solution at a pose, for study and tests; the pose is not changed.
+
+        Args:
+            goals: See ``compute_goals``.
+            previous: Solution whose pose is meant; without it ``start``, else the rest pose.
+            start: Pose that is meant.
+        """
+        state = self.body.state_of(start) if start is not None else self._state_after(previous)
+        settings = self._settings.copy()
+        settings[7], settings[8] = -1, 1
+        scratch = self._make_scratch()
+        goal = self.compute_goals(goals)
+        out = self._run(goal[None], np.empty((0, *state.shape)), state, self._attractor, settings, scratch)
+        return read_step(self._lowered, scratch, int(out.iterations[0]))
+
     def solve_frames(self, targets: Targets | Array, progress: Progress | None = None) -> MotionSolution:
         """Pose the body for every frame.
 
@@ -263,7 +249,7 @@ class PrioritizedIK:
             positions, rate, name = targets.positions, targets.rate, targets.name
         else:
             positions, rate, name = np.asarray(targets, float), 60.0, "prioritized"
-        goals = self._goals_of_frames(positions)
+        goals = self._goals.compute_frames(positions)
         starts = np.empty((0, *self._start.shape))
         if self._starter is not None and isinstance(targets, Targets):
             starts = self._sequential_starts(targets if self._restart else targets.sliced(slice(1)))
@@ -292,20 +278,11 @@ class PrioritizedIK:
         if not is_cached("prioritized"):
             log.warning("compiling kernels, once (about half a minute)")
         state = self._start.copy()
-        self._run(self._default[None], np.empty((0, *state.shape)), state, self._attractor, self._settings)
+        self._run(
+            self._goals.default[None], np.empty((0, *state.shape)), state, self._attractor, self._settings
+        )
         if self._starter is not None:
             self._starter.warm_up()
-
-    def _goals_of_frames(self, positions: Array) -> Array:
-        count = len(self._goal_rows)
-        if positions.ndim != 3 or len(positions) == 0 or positions.shape[1:] not in ((count, 3), (count, 7)):
-            raise TargetError(
-                f"goals must be (frames, {count}, 3) or (frames, {count}, 7), a row each for "
-                f"{listed(self.goal_names)}; got {positions.shape}"
-            )
-        goals = np.tile(self._default, (len(positions), 1, 1))
-        goals[:, self._goal_rows, : positions.shape[2]] = positions
-        return goals
 
     def _sequential_starts(self, targets: Targets) -> Array:
         """States (F, 2 J + 1, 4) of the Sequential IK solutions."""
@@ -320,6 +297,7 @@ class PrioritizedIK:
         state: Array,
         attractor: Array,
         settings: Array,
+        scratch: tuple[Array, ...] | None = None,
         explain: bool = False,
     ) -> _Frames:
         """Solve frames of goals (F, T, 7); the state is changed to that after the last."""
@@ -332,9 +310,14 @@ class PrioritizedIK:
             np.empty(frames, np.int64),
             np.zeros((frames if explain else 0, tasks, tasks + 1)),
         )
-        scratch = (*(np.empty(size) for size in self._sizes[:4]), np.zeros(self._sizes[4], np.int64))
-        solve_frames(*self._arrays, settings, goals, starts, state, attractor, *scratch, *out)
+        scratch = scratch or self._make_scratch()
+        arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
+        solve_frames(*arguments)
         return out
+
+    def _make_scratch(self) -> tuple[Any, ...]:
+        """Working memory of one run, so that runs in several threads do not meet."""
+        return (*(np.empty(size) for size in self._sizes[:4]), np.zeros(self._sizes[4], np.int64))
 
     def _state_after(self, previous: Solution | None) -> Array:
         if previous is None:
@@ -348,25 +331,3 @@ class PrioritizedIK:
         names = (*self.names, "joint limits")
         found = {name: np.flatnonzero(row > SHARE) for name, row in zip(names, shares, strict=False)}
         return {name: tuple(names[k] for k in held) for name, held in found.items() if len(held)}
-
-
-def _write_goal(row: Array, value: ArrayLike | None, name: str) -> None:
-    """Write a position (3,), a rotation (4,) or both (7,) into a row of seven."""
-    try:
-        goal = np.asarray(value, float)
-    except (TypeError, ValueError):
-        goal = np.zeros(0)
-    if goal.shape not in ((3,), (4,), (7,)):
-        raise TargetError(
-            f"the goal of {name!r} is a position (3,), a rotation (4,) or both (7,); got {goal.shape}"
-        )
-    if len(goal) == 3:
-        row[:3] = goal
-        if np.isnan(row[3:]).any():
-            row[3:] = 0.0, 0.0, 0.0, 1.0
-    elif len(goal) == 4:
-        row[3:] = goal
-        if np.isnan(row[:3]).any():
-            row[:3] = 0.0
-    else:
-        row[:] = goal

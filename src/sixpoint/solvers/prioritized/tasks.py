@@ -1,9 +1,9 @@
 """The constraints of prioritized IK, as data: what, where, and how important.
 
-Level 0 is the most important. A task is attached to a place: a role of the figure ("l_wrist", "head"), a joint
-or a site of the rig by name; ``offset`` shifts it to a point fixed to that joint, such as a marker. The goal and
-whether the task is active are not part of it: they are given frame by frame. ``goal`` is the value for frames
-that give none.
+Level 0 is the most important. A task is attached to a place: a role of the figure ("l_wrist", "head"), a
+joint or a site of the rig by name; ``offset`` shifts it to a point fixed to that joint, such as a marker. The
+goal and whether the task is active are not part of it: they are given frame by frame. ``goal`` is the value
+for frames that give none.
 
 A goal is a frame: a position (3,) [m], a rotation (4,) xyzw, or both (7,). NaN switches the task off.
 """
@@ -117,7 +117,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
-    """All within ``radius`` of a segment of ``length`` [m] along the goal's Y axis, centred at its position."""
+    """All within ``radius`` of a segment of ``length`` [m] that lies along the goal's Y axis around it."""
 
     radius: float
     length: float

@@ -11,9 +11,9 @@ from math import sqrt
 from sixpoint.kernels import linear
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
-from sixpoint.solvers.prioritized import packing
-from sixpoint.solvers.prioritized.packing import BALL
-from sixpoint.solvers.prioritized.rows import ENFORCED, EQUAL, build_flext
+from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.packing import BALL
+from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, build_flext
 
 
 @helper

@@ -9,9 +9,9 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import FORWARD, SIDE, TWIST, clamp, swing_limit
-from sixpoint.solvers.prioritized import packing
-from sixpoint.solvers.prioritized.packing import BALL, HINGES
-from sixpoint.solvers.prioritized.rows import ENFORCED, WAITING
+from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
+from sixpoint.solvers.prioritized.engine.rows import ENFORCED, WAITING
 
 TOLERANCE = 1e-9
 DIFFERENCE = 1e-4  # step of the numerical gradient [rad]
@@ -60,7 +60,7 @@ def release(m, w):
 
 @helper
 def lock_direction(m, w, balls, j, q, part, fixed):
-    """Lock the tangent direction of a ball joint that meets a limit; row ``fixed`` takes it onto the limit."""
+    """Lock the tangent direction in which a ball joint meets a limit; row ``fixed`` takes it there."""
     count = w.locks[j]
     if count >= 2:
         return False

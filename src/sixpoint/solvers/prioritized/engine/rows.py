@@ -12,10 +12,16 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.distance import signed_distance
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.linear import clear
-from sixpoint.solvers.prioritized import flext, packing
-from sixpoint.solvers.prioritized.kinematics import add_mass_row, add_row, compute_masses, motion_of, place_of
-from sixpoint.solvers.prioritized.packing import FIRST, JOINT, KIND, MIDDLE, ROOT
-from sixpoint.solvers.prioritized.support import compute_hull, inside_distance
+from sixpoint.solvers.prioritized.engine import flext, packing
+from sixpoint.solvers.prioritized.engine.kinematics import (
+    add_mass_row,
+    add_row,
+    compute_masses,
+    motion_of,
+    place_of,
+)
+from sixpoint.solvers.prioritized.engine.packing import FIRST, JOINT, KIND, MIDDLE, ROOT
+from sixpoint.solvers.prioritized.engine.support import compute_hull, inside_distance
 
 RADIAN = 0.2  # metres that a radian counts for
 OFF, EQUAL, WAITING, ENFORCED = 0.0, 1.0, 2.0, 3.0
@@ -151,7 +157,7 @@ def add_root_turn(m, w, index, b, r, axis, turn, state):
 
 @helper
 def hinges_for(m, w, j, turn):
-    """Angles x of up to three hinges with sum x_k axis_k nearest to a small turn (Gauss-Seidel on few axes)."""
+    """Angles of up to three hinges whose axes add up to a small turn, least squares (Gauss-Seidel)."""
     x = (0.0, 0.0, 0.0)
     a = vec.load(w.axis, m.start[j])
     b = vec.load(w.axis, m.start[j] + 1) if m.size[j] > 1 else NONE
@@ -331,7 +337,9 @@ def build_coupling(m, w, index, values, b, state, gain, weight, step):
         for k in range(m.size[joint]):
             w.rows[r + k, m.start[joint] + k] = scaled
             w.rows[r + k, m.start[other] + k] = -ratio * scaled
-        e = vec.sub(vec.scale(ratio, vec.load(state, joints + 1 + other)), vec.load(state, joints + 1 + joint))
+        e = vec.sub(
+            vec.scale(ratio, vec.load(state, joints + 1 + other)), vec.load(state, joints + 1 + joint)
+        )
     w.block[b, 0] = vec.norm(e)
     factor = scaled * limited(w.block[b, 0], gain, step)
     for k in range(index[b, packing.COUNT]):

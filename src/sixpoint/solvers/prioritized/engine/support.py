@@ -1,9 +1,9 @@
-"""The support polygon: convex hull of the feet's points on the floor, and where the centre of mass is in it."""
+"""The support polygon: convex hull of the feet's points on the floor, and where a point is in it."""
 
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.distance import nearest_on_segment, planar_norm
 from sixpoint.kernels.jit import helper
-from sixpoint.solvers.prioritized.kinematics import place_of
+from sixpoint.solvers.prioritized.engine.kinematics import place_of
 
 LIFTED = 0.05  # a point this far above the lowest one bears nothing [m]
 

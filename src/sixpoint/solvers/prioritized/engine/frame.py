@@ -4,13 +4,18 @@ from sixpoint.kernels import linear
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
-from sixpoint.solvers.prioritized import packing
-from sixpoint.solvers.prioritized.kinematics import compute_world, locals_of_hinges, retract
-from sixpoint.solvers.prioritized.limits import enforce_approaches, hold_limits, lock_violations, release
-from sixpoint.solvers.prioritized.packing import BALL, unpack_model, unpack_scratch, unpack_settings
-from sixpoint.solvers.prioritized.rows import OFF, RADIAN, build_block
-from sixpoint.solvers.prioritized.step import prioritized_step, scale_step
-from sixpoint.solvers.prioritized.yielding import report_yielding
+from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges, retract
+from sixpoint.solvers.prioritized.engine.limits import (
+    enforce_approaches,
+    hold_limits,
+    lock_violations,
+    release,
+)
+from sixpoint.solvers.prioritized.engine.packing import BALL, unpack_model, unpack_scratch, unpack_settings
+from sixpoint.solvers.prioritized.engine.rows import OFF, RADIAN, build_block
+from sixpoint.solvers.prioritized.engine.step import prioritized_step, scale_step
+from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 STALL, STALL_STEPS = 1e-4, 3  # less total improvement [m] than this over so many iterations: no more to gain
@@ -92,23 +97,27 @@ def posture_wish(m, w, state, attractor, step, row):
 
 @helper
 def limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture):
-    """The clamping loop: solve, turn what is violated into equalities, solve again."""
+    """The clamping loop: solve, turn what is violated into equalities, solve again; returns the rank."""
     step, work = fixed + 1, fixed + 3
     basis = work + w.small.shape[1]
     linear.clear(w.rows, fixed)
     release(m, w)
+    size = 0
     for _ in range(len(m.hinges) + len(index) + 2):
-        prioritized_step(m, w, index, values, goals, state, settings, fixed, step, posture, work, basis)
+        size = prioritized_step(
+            m, w, index, values, goals, state, settings, fixed, step, posture, work, basis
+        )
         violated = enforce_approaches(w, index, values, step)
         if settings.limits and lock_violations(m, w, balls, state, step, fixed):
             violated = True
         if not violated:
-            return
+            break
+    return size
 
 
 @helper
 def solve_frame(m, w, balls, index, values, goals, state, attractor, best, settings):
-    """Improve the state for one frame of goals; the best state seen is left in ``state``. Returns iterations."""
+    """Improve the state for one frame of goals and leave the best one seen there; returns the iterations."""
     joints, levels = len(m.parent), len(m.levels)
     fixed = len(w.row)
     least, totals = best[2 * joints + 1 :, 0], best[2 * joints + 1 :, 1]
@@ -130,14 +139,16 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         met = all_within(w, index, values, packing.TOLERANCE)
         if iterations >= settings.least and met:
             break
-        if iterations >= settings.most or (not met and history[0] - everything < STALL):
+        if 0 <= settings.most <= iterations or (not met and history[0] - everything < STALL):
             break
         history = (history[1], history[2], everything)
         posture = -1
         if settings.posture_step > 0.0 and (met if settings.posture_after else iterations < settings.drift):
             posture = fixed + 2
             posture_wish(m, w, state, attractor, settings.posture_step, posture)
-        limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
+        rank = limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
+        if settings.most < 0:  # only the linear step was asked for; it is in the scratch rows
+            return rank
         scale_step(m, w, settings, fixed + 1)
         retract(m, w, state, fixed + 1)
         if settings.limits:
@@ -198,18 +209,14 @@ def solve_frames(
     """
     m = unpack_model(table, integers)
     joints, columns = len(m.parent), len(m.hinges)
-    w = unpack_scratch(
-        vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points)
-    )
+    w = unpack_scratch(vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points))
     settings = unpack_settings(options)
     for f in range(len(goals)):
         if f < len(starts):
             for i in range(len(state)):
                 for k in range(4):
                     state[i, k] = starts[f, i, k]
-        iterations[f] = solve_frame(
-            m, w, balls, index, values, goals[f], state, attractor, best, settings
-        )
+        iterations[f] = solve_frame(m, w, balls, index, values, goals[f], state, attractor, best, settings)
         status[f] = status_of(w, index, values, residual[f])
         if f < len(yielded) and status[f] != CONVERGED:
             report_yielding(m, w, index, values, goals[f], len(w.row), yielded[f])
@@ -217,16 +224,3 @@ def solve_frames(
             local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(state, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)
         vec.store(translations, f, vec.load(state, joints))
-
-
-@entry
-def evaluate_rows(
-    table, integers, balls, index, values, options, goals, state, vectors, rows, small, marks
-):
-    """Errors and Jacobian rows at a state, for one frame of goals; FLEXT's rows as at the first level."""
-    m = unpack_model(table, integers)
-    joints, columns = len(m.parent), len(m.hinges)
-    w = unpack_scratch(
-        vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points)
-    )
-    evaluate(m, w, index, values, goals, state, unpack_settings(options))

@@ -5,7 +5,7 @@ from math import cos, sin
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
-from sixpoint.solvers.prioritized.packing import BALL, HINGES
+from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
 
 
 @helper
@@ -49,7 +49,7 @@ def place_of(m, w, joint, offset):
 
 @helper
 def add_row(m, w, r, joint, point, along, about):
-    """Row r += along . (velocity of a point carried by the joint) + about . (angular velocity of the joint)."""
+    """Row r += along . (velocity of a point the joint carries) + about . (the joint's angular velocity)."""
     rows = w.rows
     j = joint
     while j >= 0:
@@ -68,7 +68,7 @@ def add_row(m, w, r, joint, point, along, about):
 
 @helper
 def motion_of(m, w, joint, point, dq):
-    """How far a point carried by a joint moves, to first order, under the coordinate changes in row dq [m]."""
+    """How far a point that a joint carries moves, to first order, under the changes in row dq [m]."""
     rows = w.rows
     moved = (0.0, 0.0, 0.0)
     j = joint

@@ -1,8 +1,8 @@
 """The FLEXT constraint: how a limb must flex so that its end moves a given way towards, or from, its root.
 
-A limb is a root joint at O_r, a hinge at O_m with the unit axis f, and an effector E beyond the hinge. In the
-plane through O_r normal to f (the FLEXT plane) root, hinge and effector form a triangle with the sides L1, L2,
-L3; its angles follow from the cosine rule at every distance, at full extension too, where a Jacobian is blind.
+A limb is a root joint at O_r, a hinge at O_m with the unit axis f, and an effector E beyond the hinge. In
+the plane through O_r normal to f (the FLEXT plane) they form a triangle with the sides L1, L2, L3. Its
+angles follow from the cosine rule at every distance, also at full extension, where a Jacobian is blind.
 
 Reference: Boulic and Raunhardt 2009, section 5 and appendix A.
 """

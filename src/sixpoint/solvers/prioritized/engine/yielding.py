@@ -3,10 +3,10 @@
 from sixpoint.kernels import linear
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
-from sixpoint.solvers.prioritized import packing
-from sixpoint.solvers.prioritized.kinematics import add_row, place_of
-from sixpoint.solvers.prioritized.rows import EQUAL, ENFORCED, NONE, X, Y, Z, triple
-from sixpoint.solvers.prioritized.step import mask
+from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.kinematics import add_row, place_of
+from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, NONE, X, Y, Z, triple
+from sixpoint.solvers.prioritized.engine.step import mask
 
 
 @helper

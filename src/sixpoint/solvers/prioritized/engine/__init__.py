@@ -1,0 +1,1 @@
+"""The compiled engine: ``frame`` loops over ``rows`` (errors, Jacobians), ``step`` (levels), ``limits``."""
