@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.dofs import Dofs
+from sixpoint.body.dofs import Dofs, Hinges
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.skeleton import Skeleton
@@ -272,6 +272,12 @@ class PrioritizedIK:
     def solve_motion(self, targets: Targets) -> Motion:
         """Pose the body for every frame."""
         return self.solve_frames(targets).motion
+
+    def hinge_angles(self, solution: Solution) -> dict[str, Array]:
+        """Angles (k,) [rad] of every joint made of hinges, by joint name, of a solution of this solver."""
+        state, tree = self._state_after(solution), self.body.tree
+        angles = {j: dof.size for j, dof in self.body.dofs.joints.items() if isinstance(dof, Hinges)}
+        return {tree.names[j]: state[len(tree) + 1 + j, :size] for j, size in sorted(angles.items())}
 
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the rest pose."""
