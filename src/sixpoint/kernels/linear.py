@@ -23,6 +23,12 @@ def add(rows, i, factor, k):
         rows[i, c] += factor * rows[k, c]
 
 
+@algebra
+def scale(rows, i, factor):
+    for c in range(rows.shape[1]):
+        rows[i, c] *= factor
+
+
 @helper
 def clear(rows, i):
     for c in range(rows.shape[1]):
@@ -36,19 +42,41 @@ def copy(rows, i, k):
         rows[i, c] = rows[k, c]
 
 
+@algebra
+def _reject_four(rows, i, k):
+    """Remove from row i its parts along the four orthonormal rows from k on."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for c in range(rows.shape[1]):
+        x = rows[i, c]
+        s0 += x * rows[k, c]
+        s1 += x * rows[k + 1, c]
+        s2 += x * rows[k + 2, c]
+        s3 += x * rows[k + 3, c]
+    for c in range(rows.shape[1]):
+        rows[i, c] -= s0 * rows[k, c] + s1 * rows[k + 1, c] + s2 * rows[k + 2, c] + s3 * rows[k + 3, c]
+
+
 @helper
-def reject(rows, i, first, last):
-    """Remove from row i its part in the span of the orthonormal rows first ... last - 1."""
-    if last <= first:
-        return
-    before = dot(rows, i, i)
-    for _ in range(2):  # once more if cancellation left rounding errors
-        for k in range(first, last):
+def reject(rows, i, first, last, before):
+    """Remove from row i its part in the span of the orthonormal rows first ... last - 1.
+
+    Where most of ``before``, its squared norm once, cancels, it is done again against rounding errors.
+    Returns the squared norm of what is left.
+    """
+    after = before
+    for _ in range(2):
+        k = first
+        while k + 4 <= last:
+            _reject_four(rows, i, k)
+            k += 4
+        while k < last:
             add(rows, i, -dot(rows, i, k), k)
+            k += 1
         after = dot(rows, i, i)
         if after > 0.25 * before or after == 0.0:
-            return
+            break
         before = after
+    return after
 
 
 @helper
@@ -58,31 +86,39 @@ def extend_basis(rows, first, count, basis, size, small, threshold):
     V are orthonormal rows appended to the ``size`` rows that start at ``basis``, by Gram-Schmidt with row
     pivoting; it stops where what is left is shorter than ``threshold``. L is small[:count, :rank].
 
-    Returns the rank. The given rows are destroyed.
+    Returns the rank. The given rows are destroyed. The last row of ``small`` is used, the one before takes the
+    order of the pivots.
     """
-    for i in range(first, first + count):
-        reject(rows, i, basis, basis + size)
+    left = small.shape[0] - 1  # its row holds the squared norms of what is left
+    order = left - 1
+    for i in range(count):
+        square = dot(rows, first + i, first + i)
+        if size:
+            square = reject(rows, first + i, basis, basis + size, square)
+        small[left, i] = square
     rank = 0
     while rank < count:
         largest, pivot = threshold * threshold, -1
-        for i in range(first, first + count):
-            square = dot(rows, i, i)
-            if square > largest:
-                largest, pivot = square, i
+        for i in range(count):
+            if small[left, i] > largest:
+                largest, pivot = small[left, i], i
         if pivot < 0:
             break
         new = basis + size + rank
-        copy(rows, new, pivot)
-        if rank:
-            reject(rows, new, basis, new)
-        length = sqrt(dot(rows, new, new))
-        for c in range(rows.shape[1]):
-            rows[new, c] /= length
+        copy(rows, new, first + pivot)
+        if rank:  # it is orthogonal already, but for the rounding errors of small differences
+            largest = reject(rows, new, basis, new, largest)
+        scale(rows, new, 1.0 / sqrt(largest))
         for i in range(count):
+            if small[left, i] == 0.0:
+                small[i, rank] = 0.0
+                continue
             part = dot(rows, first + i, new)
             small[i, rank] = part
             add(rows, first + i, -part, new)
-        clear(rows, pivot)
+            small[left, i] = dot(rows, first + i, first + i)
+        small[left, pivot] = 0.0
+        small[order, rank] = pivot
         rank += 1
     return rank
 
@@ -138,12 +174,44 @@ def orthogonalise(small, count, rank):
 
 
 @helper
+def solve_triangular(small, count, right, answer, largest):
+    """The undamped solution of L y = right, where it needs no damping for sure.
+
+    With its rows in the order of the pivots L is triangular; 1 / |inv(L)| (Frobenius) is a lower bound of its
+    smallest singular value. Returns whether that alone rules damping out; then ``answer`` is written.
+    """
+    order = small.shape[0] - 2
+    norm, inverse = 0.0, 0.0
+    for c in range(count):
+        norm += small[right, c] * small[right, c]
+    for j in range(count):  # column j of the inverse into the rows below L
+        for k in range(j, count):
+            p = int(small[order, k])
+            total = 1.0 if k == j else 0.0
+            for i in range(j, k):
+                total -= small[p, i] * small[count + i, j]
+            total /= small[p, k]
+            small[count + k, j] = total
+            inverse += total * total
+    if norm * inverse > largest * largest:  # |right| / largest > 1 / |inv(L)|
+        return False
+    for k in range(count):
+        total = 0.0
+        for j in range(k + 1):
+            total += small[count + k, j] * small[right, int(small[order, j])]
+        small[answer, k] = total
+    return True
+
+
+@helper
 def solve_damped(small, count, rank, right, answer, largest, threshold):
     """Damped least squares: answer (rank,) minimises |L y - right|^2 + lambda^2 |y|^2.
 
     L = small[:count, :rank] is destroyed; small[right, :count] is the right side, the answer is written to
     small[answer, :rank]. Lambda bounds the norm of the answer by ``largest`` (``damping``).
     """
+    if rank == count and solve_triangular(small, count, right, answer, largest):
+        return
     orthogonalise(small, count, rank)
     norm = 0.0
     for c in range(count):

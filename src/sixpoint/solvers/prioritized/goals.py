@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Goals = Mapping[str, ArrayLike] | ArrayLike
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
+UNKNOWN = (np.nan, np.nan, np.nan, *UNTURNED)
 
 
 class GoalTable:
@@ -28,6 +29,10 @@ class GoalTable:
             self.default[k] = np.nan
             if tasks[k].goal is not None:
                 self._write(self.default[k], tasks[k].goal, tasks[k].label)
+        self._unturned = self.default.copy()
+        self._unturned[np.isnan(self.default[:, 3])] = UNKNOWN
+        together = self.rows == list(range(len(self.rows)))
+        self._places = slice(len(self.rows)) if together else np.array(self.rows, int)
 
     def compute(self, goals: Goals) -> Array:
         """One frame (T, 7) from a mapping of names, or an array with a row per name in ``names``."""
@@ -39,22 +44,26 @@ class GoalTable:
                 self._write(out[self.rows[self.names.index(name)]], value, name)
             return out
         try:
-            frame: Array = self.compute_frames(np.asarray(goals, float)[None])[0]
-            return frame
+            rows = np.asarray(goals, float)
         except (TypeError, ValueError):
             raise self._wrong_shape(type(goals).__name__) from None
+        out = self._start_of(rows.shape).copy()
+        out[self._places, : rows.shape[1]] = rows
+        return out
 
     def compute_frames(self, goals: Array) -> Array:
         """Frames (F, T, 7) from an array (F, G, 3) or (F, G, 7)."""
-        if goals.ndim != 3 or goals.shape[1:] not in ((len(self.rows), 3), (len(self.rows), 7)):
-            raise self._wrong_shape(goals.shape[1:])
-        out = np.tile(self.default, (len(goals), 1, 1))
-        width = goals.shape[2]
-        out[:, self.rows, :width] = goals
-        if width == 3:  # a position alone is not turned, and switches a task on that has no goal of its own
-            unknown = np.isnan(self.default[self.rows, 3:]).any(axis=1)
-            out[:, np.array(self.rows, int)[unknown], 3:] = UNTURNED
+        out = np.tile(self._start_of(goals.shape[1:]), (len(goals), 1, 1))
+        out[:, self._places, : goals.shape[2]] = goals
         return out
+
+    def _start_of(self, shape: tuple[int, ...]) -> Array:
+        """What an array of goals of one frame is written over: a position alone is not turned."""
+        if shape == (len(self.names), 3):
+            return self._unturned
+        if shape == (len(self.names), 7):
+            return self.default
+        raise self._wrong_shape(shape)
 
     def _wrong_shape(self, got: object) -> TargetError:
         count = len(self.rows)

@@ -133,7 +133,7 @@ def scratch_sizes(low: Lowered) -> tuple[tuple[int, ...], ...]:
         (2 * joints + 1 + levels, 4),
         (vectors, 4),
         (low.rows + 4 + low.widest + columns + low.widest, columns),
-        (2 * low.widest + 2, low.widest),
+        (2 * low.widest + 3, low.widest),
         (columns + joints,),
     )
 

@@ -130,7 +130,8 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     while True:
         evaluate(m, w, index, values, goals, state, settings)
         everything = total_errors(m, w, index, values, totals)
-        if is_better(totals, least, levels):
+        improved = is_better(totals, least, levels)
+        if improved:
             for i in range(2 * joints + 1):
                 for k in range(4):
                     best[i, k] = state[i, k]
@@ -154,11 +155,12 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         if settings.limits:
             hold_limits(m, balls, state)
         iterations += 1
-    for i in range(2 * joints + 1):
-        for k in range(4):
-            state[i, k] = best[i, k]
+    if not improved:
+        for i in range(2 * joints + 1):
+            for k in range(4):
+                state[i, k] = best[i, k]
+        evaluate(m, w, index, values, goals, state, settings)
     locals_of_hinges(m, state)
-    evaluate(m, w, index, values, goals, state, settings)
     return iterations
 
 

@@ -37,7 +37,7 @@ def take_level(m, w, index, values, level, goals, state, settings, step, work, b
     first, count = int(m.levels[level, 0]), int(m.levels[level, 1])
     used, longest = 0, 0.0
     capacity = w.small.shape[1]
-    right, answer = w.small.shape[0] - 2, w.small.shape[0] - 1
+    right, answer = w.small.shape[0] - 3, w.small.shape[0] - 1
     for b in range(first, first + count):
         if w.block[b, 2] != EQUAL and w.block[b, 2] != ENFORCED:
             continue
@@ -81,7 +81,7 @@ def prioritized_step(m, w, index, values, goals, state, settings, fixed, step, p
     if posture >= 0:
         linear.copy(w.rows, work, posture)
         mask(m, w, work)
-        linear.reject(w.rows, work, basis, basis + size)
+        linear.reject(w.rows, work, basis, basis + size, linear.dot(w.rows, work, work))
         linear.add(w.rows, step, 1.0, work)
     return size
 
