@@ -86,8 +86,8 @@ def extend_basis(rows, first, count, basis, size, small, threshold):
     V are orthonormal rows appended to the ``size`` rows that start at ``basis``, by Gram-Schmidt with row
     pivoting; it stops where what is left is shorter than ``threshold``. L is small[:count, :rank].
 
-    Returns the rank. The given rows are destroyed. The last row of ``small`` is used, the one before takes the
-    order of the pivots.
+    Returns the rank. The given rows are destroyed. The last row of ``small`` is used, the one before it takes
+    the order of the pivots.
     """
     left = small.shape[0] - 1  # its row holds the squared norms of what is left
     order = left - 1

@@ -219,6 +219,11 @@ class PrioritizedIK:
         gave_way = {} if status is Status.CONVERGED else self._gave_way(out.yielded[0])
         return Solution(pose, status, out.residual[0], int(out.iterations[0]), (state,), gave_way)
 
+    def begin(self, pose: Pose) -> Solution:
+        """A solution to go on from that takes a pose as it is; give it as ``previous``."""
+        state = self.body.state_of(pose)
+        return Solution(pose, Status.CONVERGED, np.zeros(len(self.tasks)), 0, (state,))
+
     def compute_step(
         self, goals: Goals, previous: Solution | None = None, *, start: Pose | None = None
     ) -> LinearStep:
