@@ -209,6 +209,8 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
         raise SixpointError("one balance task is enough: there is one centre of mass")
     if len(postures) > 1:
         raise SixpointError("one posture task is enough: it is the last of all")
+    if postures and not 0 <= postures[0].step <= 1:
+        raise SixpointError(f"the step of a posture is a share from 0 to 1, got {postures[0].step}")
     if postures and others and postures[0].level <= max(task.level for task in others):
         raise SixpointError(
             f"the posture is the lowest level: give it a level above {max(task.level for task in others)}"

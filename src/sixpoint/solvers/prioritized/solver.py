@@ -35,6 +35,7 @@ from sixpoint.solvers.sequential.solver import SequentialIK
 Array = NDArray[np.float64]
 STATUSES = tuple(Status)
 CHUNK = 64  # frames between two reports of progress
+FRAME = 1 / 60  # the time in which the posture takes its step [s]
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
 log = logging.getLogger("sixpoint")
@@ -119,6 +120,7 @@ class PrioritizedIK:
         self._start = self.body.rest_state()
         self._attractor = attractor_state(self.body, self.posture)
         self._sizes = scratch_sizes(low)
+        self._adapted: dict[float, Array] = {}
         self._starter: SequentialIK | None = None
         self._restart = False
 
@@ -198,7 +200,7 @@ class PrioritizedIK:
         Args:
             goals: See ``compute_goals``. Of a solver made by ``from_targets``: (6, 3) points [m].
             previous: The solution of the frame before, if any.
-            dt: Not used: a step is as long as the goals ask for.
+            dt: Time since that frame [s]: how far the posture may drift.
             start: Pose to begin from, instead of the previous one.
             posture: Pose that the posture task is drawn to in this frame.
 
@@ -210,7 +212,7 @@ class PrioritizedIK:
         if start is None and self._starter is not None and (previous is None or self._restart):
             start = self._starter.solve(frame[:, :3], None).pose
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
-        settings = self._cold_settings if previous is None and start is None else self._settings
+        settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
         attractor = self._attractor if posture is None else self.body.state_of(posture)
         out = self._run(frame[None], np.empty((0, *state.shape)), state, attractor, settings, explain=True)
         moving, translations = self.body.place_base(out.rotations, out.positions)
@@ -264,7 +266,7 @@ class PrioritizedIK:
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
-            settings = self._cold_settings if first == 0 and not len(starts) else self._settings
+            settings = self._cold_settings if first == 0 and not len(starts) else self._settings_at(1 / rate)
             parts.append(self._run(goals[part], starts[part], state, self._attractor, settings))
             if progress:
                 progress(part.stop)
@@ -329,6 +331,17 @@ class PrioritizedIK:
     def _make_scratch(self) -> tuple[Any, ...]:
         """Working memory of one run, so that runs in several threads do not meet."""
         return (*(np.empty(size) for size in self._sizes[:4]), np.zeros(self._sizes[4], np.int64))
+
+    def _settings_at(self, dt: float) -> Array:
+        """Settings whose posture drifts alike at every frame rate; the last ones asked for are kept."""
+        known = self._adapted.get(dt)
+        if known is None:
+            if len(self._adapted) > 100:
+                self._adapted.clear()
+            known = self._adapted[dt] = self._settings.copy()
+            frames = min(dt, 1e3) / FRAME if dt > 0 else 0.0
+            known[5] = 1.0 - (1.0 - known[5]) ** frames
+        return known
 
     def _state_after(self, previous: Solution | None) -> Array:
         if previous is None:

@@ -237,7 +237,8 @@ class PostureTask(Task):
         pose: "relaxed": standing, elbows and knees slightly bent (a plain skeleton: its rest pose);
             "middle": the middle of each hinge's range; or a pose of the rig.
         weights: Place -> how strongly; 1 unless a figure's trunk (2) or clavicles (5).
-        step: Share of the way done in each iteration.
+        step: Share of the way done in a sixtieth of a second; in each iteration of a frame without a previous
+            one.
         after: Only once all tasks are met.
     """
 

@@ -18,7 +18,9 @@ from sixpoint.solvers.prioritized.engine.step import prioritized_step, scale_ste
 from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
-STALL, STALL_STEPS = 1e-4, 3  # less total improvement [m] than this over so many iterations: no more to gain
+GAIN = 3e-5  # less than this is no gain [m]: 0.1 mm in three iterations
+PATIENCE = 2  # steps without gain before going back
+SHORTEST = 0.02  # share of a step below which there is no more to gain
 
 
 @helper
@@ -31,8 +33,7 @@ def evaluate(m, w, index, values, goals, state, settings):
 
 @helper
 def total_errors(m, w, index, values, totals):
-    """Write what errors exceed their tolerances by, summed per level [m]; return the sum of all errors."""
-    everything = 0.0
+    """Write what errors exceed their tolerances by, summed per level [m]."""
     for level in range(len(m.levels)):
         totals[level] = 0.0
     for b in range(len(index)):
@@ -43,8 +44,6 @@ def total_errors(m, w, index, values, totals):
         angular = angular or kind == packing.ALIGNMENT or kind == packing.COUPLING
         scale = RADIAN if angular else 1.0
         totals[index[b, packing.LEVEL]] += scale * max(w.block[b, 0] - values[b, packing.TOLERANCE], 0.0)
-        everything += scale * w.block[b, 0]
-    return everything
 
 
 @helper
@@ -57,14 +56,22 @@ def all_within(w, index, values, column):
 
 
 @helper
-def is_better(totals, best, levels):
-    """Whether errors are smaller, the most important level first."""
-    for level in range(levels):
-        if totals[level] < best[level] - 1e-6:
-            return True
-        if totals[level] > best[level] + 1e-6:
+def all_off(w, index):
+    for b in range(len(index)):
+        if w.block[b, 2] != OFF:
             return False
     return True
+
+
+@helper
+def is_better(totals, best, levels):
+    """Whether errors are smaller by enough to matter, the most important level first."""
+    for level in range(levels):
+        if totals[level] < best[level] - GAIN:
+            return True
+        if totals[level] > best[level] + GAIN:
+            return False
+    return False
 
 
 @helper
@@ -116,33 +123,48 @@ def limited_step(m, w, balls, index, values, goals, state, settings, fixed, post
 
 
 @helper
+def copy_state(source, target, rows):
+    for i in range(rows):
+        for k in range(4):
+            target[i, k] = source[i, k]
+
+
+@helper
 def solve_frame(m, w, balls, index, values, goals, state, attractor, best, settings):
-    """Improve the state for one frame of goals and leave the best one seen there; returns the iterations."""
-    joints, levels = len(m.parent), len(m.levels)
+    """Improve the state for one frame of goals and leave the best one seen there; returns the iterations.
+
+    A step that brings no gain may be followed by one that does. After ``PATIENCE`` of them it goes on from the
+    best state with shorter steps: what bends away from its tangent then bends away less.
+    """
+    size, levels = 2 * len(m.parent) + 1, len(m.levels)
     fixed = len(w.row)
-    least, totals = best[2 * joints + 1 :, 0], best[2 * joints + 1 :, 1]
-    for k in range(levels):
-        least[k] = 1e300
+    least, totals = best[size:, 0], best[size:, 1]
     if settings.limits:
         hold_limits(m, balls, state)
-    history = (1e300, 1e300, 1e300)
-    iterations = 0
+    share, failed, iterations, current = 1.0, 0, 0, True
     while True:
         evaluate(m, w, index, values, goals, state, settings)
-        everything = total_errors(m, w, index, values, totals)
-        improved = is_better(totals, least, levels)
-        if improved:
-            for i in range(2 * joints + 1):
-                for k in range(4):
-                    best[i, k] = state[i, k]
+        total_errors(m, w, index, values, totals)
+        if iterations == 0 and len(index) > 0 and all_off(w, index):
+            break  # nothing is known: stand still
+        met = all_within(w, index, values, packing.TOLERANCE)
+        current = iterations == 0 or met or is_better(totals, least, levels)
+        if current:
+            copy_state(state, best, size)
             for k in range(levels):
                 least[k] = totals[k]
-        met = all_within(w, index, values, packing.TOLERANCE)
-        if iterations >= settings.least and met:
+            failed, share = 0, min(2.0 * share, 1.0)
+        else:
+            failed += 1
+        if (met and iterations >= settings.least) or 0 <= settings.most <= iterations:
             break
-        if 0 <= settings.most <= iterations or (not met and history[0] - everything < STALL):
-            break
-        history = (history[1], history[2], everything)
+        if failed >= PATIENCE:
+            share *= 0.3
+            if share < SHORTEST:
+                break
+            copy_state(best, state, size)
+            evaluate(m, w, index, values, goals, state, settings)
+            failed, current = 0, True
         posture = -1
         if settings.posture_step > 0.0 and (met if settings.posture_after else iterations < settings.drift):
             posture = fixed + 2
@@ -150,15 +172,13 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         rank = limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
         if settings.most < 0:  # only the linear step was asked for; it is in the scratch rows
             return rank
-        scale_step(m, w, settings, fixed + 1)
+        scale_step(m, w, settings, fixed + 1, share)
         retract(m, w, state, fixed + 1)
         if settings.limits:
             hold_limits(m, balls, state)
         iterations += 1
-    if not improved:
-        for i in range(2 * joints + 1):
-            for k in range(4):
-                state[i, k] = best[i, k]
+    if not current:
+        copy_state(best, state, size)
         evaluate(m, w, index, values, goals, state, settings)
     locals_of_hinges(m, state)
     return iterations

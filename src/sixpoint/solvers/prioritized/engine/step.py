@@ -87,8 +87,8 @@ def prioritized_step(m, w, index, values, goals, state, settings, fixed, step, p
 
 
 @helper
-def scale_step(m, w, settings, step):
-    """Shorten the whole step so that no angle and no translation exceeds its cap."""
+def scale_step(m, w, settings, step, share):
+    """Take a share of the step, or less so that no angle and no translation exceeds its cap."""
     angle, shift = 0.0, 0.0
     first = 3 if m.free else 0
     for c in range(first, len(m.hinges)):
@@ -99,8 +99,8 @@ def scale_step(m, w, settings, step):
             angle = max(angle, vec.norm((w.rows[step, s], w.rows[step, s + 1], w.rows[step, s + 2])))
     if m.free:
         shift = vec.norm((w.rows[step, 0], w.rows[step, 1], w.rows[step, 2]))
-    factor = 1.0
-    if angle > settings.max_angle:
+    factor = share
+    if angle * factor > settings.max_angle:
         factor = settings.max_angle / angle
     if shift * factor > settings.max_shift:
         factor = settings.max_shift / shift
