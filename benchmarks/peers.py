@@ -1,8 +1,8 @@
 """Six position targets on a hinge human: prioritized IK beside mink, in one run, on one core.
 
-Both start from the true pose of frame 0 and go on from their own last pose, at most 20 iterations a frame. The
-clock covers setting the targets, solving and the residual. Poses are measured by forward kinematics that belong
-to neither. Each frame's time is the best of the rounds, in which the two take turns.
+Both start from the true pose of frame 0 and go on from their own last pose, at most 20 iterations a frame.
+The clock covers setting the targets, solving and the residual. Poses are measured by forward kinematics that
+belong to neither. Each frame's time is the best of the rounds, in which the two take turns.
 
     python benchmarks/peers.py [--human FILE.py] [--seeds 1 2 3] [--json FILE] [--docs]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,12 @@ from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.prioritized.articulation import Articulation
-from sixpoint.solvers.prioritized.engine.frame import solve_frames
-from sixpoint.solvers.prioritized.engine.packing import Settings, pack_model, pack_settings
+from sixpoint.solvers.prioritized.engine.packing import Settings, pack_settings
 from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks
 from sixpoint.solvers.prioritized.goals import Goals, GoalTable
 from sixpoint.solvers.prioritized.linear_step import LinearStep, read_step
-from sixpoint.solvers.prioritized.model import check_tasks, lower, scratch_sizes
+from sixpoint.solvers.prioritized.model import check_tasks, lower
+from sixpoint.solvers.prioritized.running import Engine, Frames
 from sixpoint.solvers.prioritized.tasks import Task
 from sixpoint.solvers.sequential.solver import SequentialIK
 
@@ -39,17 +39,6 @@ FRAME = 1 / 60  # the time in which the posture takes its step [s]
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
 log = logging.getLogger("sixpoint")
-
-
-class _Frames(NamedTuple):
-    """What a run over frames writes."""
-
-    rotations: Array
-    positions: Array
-    status: NDArray[np.int64]
-    residual: Array
-    iterations: NDArray[np.int64]
-    yielded: Array
 
 
 class PrioritizedIK:
@@ -94,7 +83,6 @@ class PrioritizedIK:
             raise SixpointError("iterations are whole numbers, at least least_iterations >= 0")
         self.body = Articulation.of(body, dofs)
         self.tasks, self.posture = check_tasks(self.body, tasks)
-        self._lowered = lower(self.body, self.tasks, self.posture)
         self._settings = pack_settings(
             Settings(
                 limits,
@@ -112,14 +100,10 @@ class PrioritizedIK:
         self._cold_settings = self._settings.copy()
         self._cold_settings[7] = max(iterations, cold_iterations)
         self._cold_settings[9] = max(iterations, cold_iterations) // 2
-        table, integers = pack_model(self._lowered.model)
-        integers[6] = self._lowered.rows
-        low = self._lowered
-        self._arrays: tuple[Any, ...] = (table, integers, low.balls, low.index, low.values)
+        self._engine = Engine(lower(self.body, self.tasks, self.posture), len(self.tasks))
         self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
         self._attractor = attractor_state(self.body, self.posture)
-        self._sizes = scratch_sizes(low)
         self._adapted: dict[float, Array] = {}
         self._starter: SequentialIK | None = None
         self._restart = False
@@ -214,7 +198,9 @@ class PrioritizedIK:
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
         settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
         attractor = self._attractor if posture is None else self.body.state_of(posture)
-        out = self._run(frame[None], np.empty((0, *state.shape)), state, attractor, settings, explain=True)
+        out = self._engine.run(
+            frame[None], np.empty((0, *state.shape)), state, attractor, settings, explain=True
+        )
         moving, translations = self.body.place_base(out.rotations, out.positions)
         pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)
         status = STATUSES[out.status[0]]
@@ -239,10 +225,12 @@ class PrioritizedIK:
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
         settings = self._settings.copy()
         settings[7], settings[8] = -1, 1
-        scratch = self._make_scratch()
+        scratch = self._engine.make_scratch()
         goal = self.compute_goals(goals)
-        out = self._run(goal[None], np.empty((0, *state.shape)), state, self._attractor, settings, scratch)
-        return read_step(self._lowered, scratch, int(out.iterations[0]))
+        out = self._engine.run(
+            goal[None], np.empty((0, *state.shape)), state, self._attractor, settings, scratch
+        )
+        return read_step(self._engine.lowered, scratch, int(out.iterations[0]))
 
     def solve_frames(self, targets: Targets | Array, progress: Progress | None = None) -> MotionSolution:
         """Pose the body for every frame.
@@ -267,10 +255,10 @@ class PrioritizedIK:
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             settings = self._cold_settings if first == 0 and not len(starts) else self._settings_at(1 / rate)
-            parts.append(self._run(goals[part], starts[part], state, self._attractor, settings))
+            parts.append(self._engine.run(goals[part], starts[part], state, self._attractor, settings))
             if progress:
                 progress(part.stop)
-        out = _Frames(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        out = Frames(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         moving, translations = self.body.place_base(out.rotations, out.positions)
         out.rotations.flags.writeable = False  # hand over instead of copying
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
@@ -291,7 +279,7 @@ class PrioritizedIK:
         if not is_cached("prioritized"):
             log.warning("compiling kernels, once (about half a minute)")
         state = self._start.copy()
-        self._run(
+        self._engine.run(
             self._goals.default[None], np.empty((0, *state.shape)), state, self._attractor, self._settings
         )
         if self._starter is not None:
@@ -302,35 +290,6 @@ class PrioritizedIK:
         assert self._starter is not None
         motion = self._starter.solve_motion(targets)
         return self.body.states_of(motion.rotations, motion.positions[:, self.body.base])
-
-    def _run(
-        self,
-        goals: Array,
-        starts: Array,
-        state: Array,
-        attractor: Array,
-        settings: Array,
-        scratch: tuple[Array, ...] | None = None,
-        explain: bool = False,
-    ) -> _Frames:
-        """Solve frames of goals (F, T, 7); the state is changed to that after the last."""
-        frames, joints, tasks = len(goals), len(self.body.tree), len(self.tasks)
-        out = _Frames(
-            np.empty((frames, joints, 4)),
-            np.empty((frames, 3)),
-            np.empty(frames, np.int64),
-            np.empty((frames, tasks)),
-            np.empty(frames, np.int64),
-            np.zeros((frames if explain else 0, tasks, tasks + 1)),
-        )
-        scratch = scratch or self._make_scratch()
-        arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
-        solve_frames(*arguments)
-        return out
-
-    def _make_scratch(self) -> tuple[Any, ...]:
-        """Working memory of one run, so that runs in several threads do not meet."""
-        return (*(np.empty(size) for size in self._sizes[:4]), np.zeros(self._sizes[4], np.int64))
 
     def _settings_at(self, dt: float) -> Array:
         """Settings whose posture drifts alike at every frame rate; the last ones asked for are kept."""

@@ -133,8 +133,8 @@ def copy_state(source, target, rows):
 def solve_frame(m, w, balls, index, values, goals, state, attractor, best, settings):
     """Improve the state for one frame of goals and leave the best one seen there; returns the iterations.
 
-    A step that brings no gain may be followed by one that does. After ``PATIENCE`` of them it goes on from the
-    best state with shorter steps: what bends away from its tangent then bends away less.
+    A step that brings no gain may be followed by one that does. After ``PATIENCE`` of them it goes on from
+    the best state with shorter steps: what bends away from its tangent then bends away less.
     """
     size, levels = 2 * len(m.parent) + 1, len(m.levels)
     fixed = len(w.row)
@@ -166,7 +166,8 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             evaluate(m, w, index, values, goals, state, settings)
             failed, current = 0, True
         posture = -1
-        if settings.posture_step > 0.0 and (met if settings.posture_after else iterations < settings.drift):
+        drifts = met if settings.posture_after else iterations < settings.drift
+        if drifts and settings.posture_step > 0.0:
             posture = fixed + 2
             posture_wish(m, w, state, attractor, settings.posture_step, posture)
         rank = limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
