@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 STATUSES = tuple(Status)
 CHUNK = 64  # frames between two reports of progress
 FRAME = 1 / 60  # the time in which the posture takes its step [s]
+POSTURE_STEP = 0.1  # largest turn of a joint towards the posture in one iteration [rad]
+POSTURE_SPEED = 6.0  # the same from frame to frame [rad/s]
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
 log = logging.getLogger("sixpoint")
@@ -83,23 +85,21 @@ class PrioritizedIK:
             raise SixpointError("iterations are whole numbers, at least least_iterations >= 0")
         self.body = Articulation.of(body, dofs)
         self.tasks, self.posture = check_tasks(self.body, tasks)
-        self._settings = pack_settings(
-            Settings(
-                limits,
-                gain,
-                max_angle,
-                max_shift,
-                rank_threshold,
-                0.0 if self.posture is None else self.posture.step,
-                self.posture is not None and self.posture.after,
-                iterations,
-                least_iterations,
-                1,
-            )
+        self._settings = Settings(
+            limits=limits,
+            gain=gain,
+            max_angle=max_angle,
+            max_shift=max_shift,
+            rank=rank_threshold,
+            posture_step=0.0 if self.posture is None else self.posture.step,
+            posture_cap=POSTURE_STEP,
+            posture_after=self.posture is not None and self.posture.after,
+            most=iterations,
+            least=least_iterations,
+            drift=1,
         )
-        self._cold_settings = self._settings.copy()
-        self._cold_settings[7] = max(iterations, cold_iterations)
-        self._cold_settings[9] = max(iterations, cold_iterations) // 2
+        most = max(iterations, cold_iterations)
+        self._cold_settings = pack_settings(self._settings._replace(most=most, drift=most // 2))
         self._engine = Engine(lower(self.body, self.tasks, self.posture), len(self.tasks))
         self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
@@ -223,8 +223,7 @@ class PrioritizedIK:
             start: Pose that is meant.
         """
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
-        settings = self._settings.copy()
-        settings[7], settings[8] = -1, 1
+        settings = pack_settings(self._settings._replace(most=-1, least=1))
         scratch = self._engine.make_scratch()
         goal = self.compute_goals(goals)
         out = self._engine.run(
@@ -279,9 +278,8 @@ class PrioritizedIK:
         if not is_cached("prioritized"):
             log.warning("compiling kernels, once (about half a minute)")
         state = self._start.copy()
-        self._engine.run(
-            self._goals.default[None], np.empty((0, *state.shape)), state, self._attractor, self._settings
-        )
+        empty = np.empty((0, *state.shape))
+        self._engine.run(self._goals.default[None], empty, state, self._attractor, self._settings_at(FRAME))
         if self._starter is not None:
             self._starter.warm_up()
 
@@ -297,9 +295,12 @@ class PrioritizedIK:
         if known is None:
             if len(self._adapted) > 100:
                 self._adapted.clear()
-            known = self._adapted[dt] = self._settings.copy()
-            frames = min(dt, 1e3) / FRAME if dt > 0 else 0.0
-            known[5] = 1.0 - (1.0 - known[5]) ** frames
+            time = min(dt, 1e3) if dt > 0 else 0.0
+            drifting = self._settings._replace(
+                posture_step=1.0 - (1.0 - self._settings.posture_step) ** (time / FRAME),
+                posture_cap=min(POSTURE_SPEED * time, POSTURE_STEP),
+            )
+            known = self._adapted[dt] = pack_settings(drifting)
         return known
 
     def _state_after(self, previous: Solution | None) -> Array:

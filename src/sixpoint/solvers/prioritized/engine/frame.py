@@ -19,6 +19,7 @@ from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 GAIN = 3e-5  # less than this is no gain [m]: 0.1 mm in three iterations
+QUIET = 0.15  # share of the speed of the posture while a goal is unknown: what it let go sinks slowly
 PATIENCE = 2  # steps without gain before going back
 SHORTEST = 0.02  # share of a step below which there is no more to gain
 
@@ -56,11 +57,15 @@ def all_within(w, index, values, column):
 
 
 @helper
-def all_off(w, index):
+def count_off(w, index):
+    """Number of blocks without a goal, and with one; drags come and go by themselves."""
+    off, on = 0, 0
     for b in range(len(index)):
         if w.block[b, 2] != OFF:
-            return False
-    return True
+            on += 1
+        elif index[b, packing.KIND] != packing.DRAG:
+            off += 1
+    return off, on
 
 
 @helper
@@ -75,7 +80,7 @@ def is_better(totals, best, levels):
 
 
 @helper
-def posture_wish(m, w, state, attractor, step, row):
+def posture_wish(m, w, state, attractor, step, cap, row):
     """Step of the posture optimisation in a row: down the gradient of the weighted distance to the attractor.
 
     Reference: section 1 of Baerlocher and Boulic 2004; Liegeois 1977.
@@ -97,9 +102,8 @@ def posture_wish(m, w, state, attractor, step, row):
                 w.rows[row, start + k] = step * m.bounds[start + k, 2] * gap
         for k in range(m.size[j]):
             longest = max(longest, abs(w.rows[row, start + k]))
-    if longest > 0.1:
-        for c in range(w.rows.shape[1]):
-            w.rows[row, c] *= 0.1 / longest
+    if longest > cap:
+        linear.scale(w.rows, row, cap / longest)
 
 
 @helper
@@ -145,7 +149,8 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     while True:
         evaluate(m, w, index, values, goals, state, settings)
         total_errors(m, w, index, values, totals)
-        if iterations == 0 and len(index) > 0 and all_off(w, index):
+        off, on = count_off(w, index)
+        if off > 0 and on == 0:
             break  # nothing is known: stand still
         met = all_within(w, index, values, packing.TOLERANCE)
         current = iterations == 0 or met or is_better(totals, least, levels)
@@ -169,7 +174,8 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         drifts = met if settings.posture_after else iterations < settings.drift
         if drifts and settings.posture_step > 0.0:
             posture = fixed + 2
-            posture_wish(m, w, state, attractor, settings.posture_step, posture)
+            cap = settings.posture_cap * (QUIET if off else 1.0)
+            posture_wish(m, w, state, attractor, settings.posture_step, cap, posture)
         rank = limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
         if settings.most < 0:  # only the linear step was asked for; it is in the scratch rows
             return rank

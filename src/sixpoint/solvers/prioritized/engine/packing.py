@@ -127,6 +127,7 @@ class Settings(NamedTuple):
     max_shift: float
     rank: float
     posture_step: float
+    posture_cap: float
     posture_after: bool
     most: int
     least: int
@@ -134,13 +135,13 @@ class Settings(NamedTuple):
 
 
 def pack_settings(settings):
-    """Settings as ten numbers."""
+    """Settings as eleven numbers."""
     return np.array([float(value) for value in settings])
 
 
 @helper
 def unpack_settings(options):
-    """Settings from ten numbers."""
+    """Settings from eleven numbers."""
     return Settings(
         options[0] > 0.0,
         options[1],
@@ -148,10 +149,11 @@ def unpack_settings(options):
         options[3],
         options[4],
         options[5],
-        options[6] > 0.0,
-        int(options[7]),
+        options[6],
+        options[7] > 0.0,
         int(options[8]),
         int(options[9]),
+        int(options[10]),
     )
 
 
