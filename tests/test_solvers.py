@@ -21,7 +21,7 @@ REST = {"sik": 1e-12, "pik": 5e-3, "pik-flext": 5e-3}
 """1 - cos(half angle) that the neutral pose may be off: prioritized IK relaxes elbows and knees."""
 STRETCHED = {"sik": 1e-6, "pik": 2e-2, "pik-flext": 2e-2}
 """How far the unit vector along a stretched limb may be off."""
-SETTLED = {"sik": 1, "pik": 20, "pik-flext": 20}
+SETTLED = {"sik": 1, "pik": 60, "pik-flext": 60}
 """Frames after which a method stands still before a world that no pose can meet."""
 SCALED = {"sik": 1e-5, "pik": 0.02, "pik-flext": 0.1}
 """Angle [rad] by which the pose of a scaled body may differ: thresholds are in metres."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.solvers.prioritized.engine.frame import solve_frames
+from sixpoint.solvers.prioritized.engine.frame import solve_prioritized
 from sixpoint.solvers.prioritized.engine.packing import pack_model
 from sixpoint.solvers.prioritized.model import Lowered, scratch_sizes
 
@@ -77,7 +77,7 @@ class Engine:
         )
         scratch = scratch or self.make_scratch()
         arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
-        solve_frames(*arguments)
+        solve_prioritized(*arguments)
         return out
 
     def make_scratch(self) -> tuple[Any, ...]:

@@ -275,7 +275,7 @@ class PrioritizedIK:
 
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the rest pose."""
-        if not is_cached("prioritized"):
+        if not is_cached("solve_prioritized"):
             log.warning("compiling kernels, once (about half a minute)")
         state = self._start.copy()
         empty = np.empty((0, *state.shape))

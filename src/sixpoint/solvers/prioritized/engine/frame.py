@@ -208,7 +208,7 @@ def status_of(w, index, values, residual):
 
 
 @entry
-def solve_frames(
+def solve_prioritized(
     table,
     integers,
     balls,
