@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check benchmark results clean
+.PHONY: demo test check benchmark results peers clean
 
 demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
 	$(BIN)/sixpoint demo --force
@@ -22,6 +22,10 @@ benchmark: $(VENV)/run.stamp  ## Time a warm solver beside forward kinematics
 
 results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/results.md
 	$(BIN)/python benchmarks/paper_table.py
+
+peers: $(VENV)/run.stamp  ## Time six targets on hinges beside mink and rewrite docs/results.md
+	@$(PIP) install --editable '.[bench]'
+	$(BIN)/python benchmarks/peers.py --docs
 
 clean:
 	rm -rf $(VENV) demo

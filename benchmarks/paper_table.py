@@ -1,4 +1,4 @@
-"""Measure Sequential IK on the clips of the paper and write the table between the marks of docs/results.md.
+"""Measure Sequential and Prioritized IK on the clips of the paper, and write the tables of docs/results.md.
 
 python benchmarks/paper_table.py [--data FOLDER]
 """
@@ -6,6 +6,7 @@ python benchmarks/paper_table.py [--data FOLDER]
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,12 @@ import sixpoint as sp
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
 RESULTS = ROOT / "docs" / "results.md"
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
+MARKS = ("table", "pik")
 
 PAPER = {"boxing": (0.0265, 0.2508), "jump kick": (0.0213, 0.2849), "playground": (0.0261, 0.3469)}
+PAPER_PIK = {"boxing": (0.0283, 0.3256), "jump kick": (0.0247, 0.3447), "playground": (0.0240, 0.3472)}
+PAPER_MS = {"boxing": 28.56, "jump kick": 39.54, "playground": 28.40}
+PIK = {"pik-flext": {}, "pik": {}, "pik-flext, from sik": {"start": "sequential"}}
 CLIPS = {
     "boxing": ("17_10.amc", (1.0, 1.0, 0.0), 0),
     "jump kick": ("90_05_repaired.bvh", (1.0, 1.0, 0.0), 1),
@@ -62,6 +66,46 @@ def table(folder: Path) -> list[str]:
     return lines
 
 
+def measure_pik(folder: Path, name: str, method: str) -> tuple[float, float, float, float]:
+    """Position error, orientation error [rad], worst residual [m], median time of a single solve [ms]."""
+    file, _, skip = CLIPS[name]
+    motion = sp.load(folder / "paper" / file).sliced(slice(skip, None))
+    figure = sp.Figure.from_motion(motion)
+    targets = figure.targets(motion)
+    solver = sp.make_solver(method.split(",")[0], figure, **PIK[method])
+    solved = solver.solve_frames(targets)
+    errors = sp.compute_errors(figure, motion, solved.motion)
+    times, solution = [], None
+    for points in targets.positions[: min(len(targets), 1000)]:
+        start = time.perf_counter()
+        solution = solver.solve(points, previous=solution, dt=1 / targets.rate)
+        times.append(time.perf_counter() - start)
+    return errors.position, errors.orientation, solved.residual.max(), 1e3 * float(np.median(times))
+
+
+def table_pik(folder: Path) -> list[str]:
+    """Markdown rows of prioritized IK."""
+    lines = [
+        "| clip | method | errors | worst point off, mm | median ms | paper's PIK | paper's ms |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for method in PIK:
+        found = {name: measure_pik(folder, name, method) for name in PAPER}
+        for name, (position, orientation, worst, spent) in found.items():
+            paper = PAPER_PIK[name]
+            lines.append(
+                f"| {name} | {method} | {position:.4f} / {orientation:.4f} | {1e3 * worst:.1f} | {spent:.3f} "
+                f"| {paper[0]:.4f} / {paper[1]:.4f} | {PAPER_MS[name]} |"
+            )
+        mean = np.mean(list(found.values()), axis=0)
+        paper = np.mean(list(PAPER_PIK.values()), axis=0)
+        lines.append(
+            f"| **average** | {method} | **{mean[0]:.4f} / {mean[1]:.4f}** | | {mean[3]:.3f} "
+            f"| {paper[0]:.4f} / {paper[1]:.4f} | {np.mean(list(PAPER_MS.values())):.2f} |"
+        )
+    return lines
+
+
 def row(name, missed, free, limited, paper) -> str:
     """One Markdown row; None leaves a cell empty."""
     reached = "" if missed is None else f"{100 * (1 - missed):.0f} %"
@@ -70,14 +114,18 @@ def row(name, missed, free, limited, paper) -> str:
 
 
 def main() -> None:
-    """Write the table."""
+    """Write the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
-    lines = table(parser.parse_args().data)
-    print("\n".join(lines))
+    folder = parser.parse_args().data
     text = RESULTS.read_text("utf-8")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    RESULTS.write_text(f"{before}{BEGIN}\n" + "\n".join(lines) + f"\n{END}{after}", "utf-8")
+    for mark, make in zip(MARKS, (table, table_pik), strict=True):
+        lines = make(folder)
+        print("\n".join(lines), "\n")
+        begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
+        before, after = text.split(begin)[0], text.split(end)[1]
+        text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
+    RESULTS.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -193,8 +194,10 @@ class PrioritizedIK:
             SixpointError: ``previous``, ``start`` or ``posture`` is of another body.
         """
         frame = self.compute_goals(goals)
+        begun: tuple[Array, ...] = ()
         if start is None and self._starter is not None and (previous is None or self._restart):
-            start = self._starter.solve(frame[:, :3], None).pose
+            first = self._starter.solve(frame[:, :3], self._started(previous), dt)
+            start, begun = first.pose, first.state if self._restart else ()
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
         settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
         attractor = self._attractor if posture is None else self.body.state_of(posture)
@@ -205,7 +208,7 @@ class PrioritizedIK:
         pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)
         status = STATUSES[out.status[0]]
         gave_way = {} if status is Status.CONVERGED else self._gave_way(out.yielded[0])
-        return Solution(pose, status, out.residual[0], int(out.iterations[0]), (state,), gave_way)
+        return Solution(pose, status, out.residual[0], int(out.iterations[0]), (state, *begun), gave_way)
 
     def begin(self, pose: Pose) -> Solution:
         """A solution to go on from that takes a pose as it is; give it as ``previous``."""
@@ -282,6 +285,13 @@ class PrioritizedIK:
         self._engine.run(self._goals.default[None], empty, state, self._attractor, self._settings_at(FRAME))
         if self._starter is not None:
             self._starter.warm_up()
+
+    def _started(self, previous: Solution | None) -> Solution | None:
+        """The Sequential IK solution that belongs to a previous one, if that began from it."""
+        self._state_after(previous)  # of this body?
+        if previous is None or len(previous.state) < 2:
+            return None
+        return replace(previous, state=previous.state[1:])
 
     def _sequential_starts(self, targets: Targets) -> Array:
         """States (F, 2 J + 1, 4) of the Sequential IK solutions."""
