@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,7 @@ Array = NDArray[np.float64]
 
 X, Z = np.eye(3)[[0, 2]]
 
+FAR = 1e7  # a position farther away is unknown [m], as in Sequential IK
 ELBOW, SHOULDER_BACK, SHOULDER_OUT, KNEE, HIP = np.radians([20.0, 10.0, 10.0, 15.0, 8.0])
 """Relaxed standing: "elbows slightly bent and backward, knees slightly bent and forward".
 
@@ -42,6 +45,24 @@ def default_tasks(flext: bool = True) -> list[Task]:
         *legs,
         PostureTask(level=8),
     ]
+
+
+def place_base(body: Articulation, tasks: Sequence[Task], goals: Array, state: Array) -> None:
+    """Move a free base of the rest state so that the most important positions are met on average.
+
+    From too far away the levels below would turn the body over before it arrives.
+    """
+    if not body.dofs.free_root:
+        return
+    known = [
+        (task.level, goal[:3] - body.rest_positions[joint] - offset)
+        for task, goal in zip(tasks, goals, strict=True)
+        if isinstance(task, PositionTask | FlextTask) and np.all(np.abs(goal[:3]) < FAR)
+        for joint, offset in [body.place(task.at)]
+    ]
+    if known:
+        first = min(level for level, _ in known)
+        state[len(body.tree), :3] += np.mean([gap for level, gap in known if level == first], axis=0)
 
 
 def attractor_state(body: Articulation, posture: PostureTask | None) -> Array:

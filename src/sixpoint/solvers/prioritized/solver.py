@@ -25,7 +25,7 @@ from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.engine.packing import Settings, pack_settings
-from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks
+from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks, place_base
 from sixpoint.solvers.prioritized.goals import Goals, GoalTable
 from sixpoint.solvers.prioritized.linear_step import LinearStep, read_step
 from sixpoint.solvers.prioritized.model import check_tasks, lower
@@ -199,6 +199,8 @@ class PrioritizedIK:
             first = self._starter.solve(frame[:, :3], self._started(previous), dt)
             start, begun = first.pose, first.state if self._restart else ()
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
+        if previous is None and start is None:
+            place_base(self.body, self.tasks, frame, state)
         settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
         attractor = self._attractor if posture is None else self.body.state_of(posture)
         out = self._engine.run(
@@ -251,6 +253,8 @@ class PrioritizedIK:
         if self._starter is not None and isinstance(targets, Targets):
             starts = self._sequential_starts(targets if self._restart else targets.sliced(slice(1)))
         state = self._start.copy()
+        if not len(starts):
+            place_base(self.body, self.tasks, goals[0], state)
         frames = len(goals)
         parts = []
         step = CHUNK if progress else frames

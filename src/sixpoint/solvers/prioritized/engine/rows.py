@@ -61,7 +61,7 @@ def known(goals, t, kind):
     elif kind == packing.BALANCE or kind == packing.COUPLING:
         last = 0
     for k in range(first, last):
-        if not abs(goals[t, k]) < 1e9:
+        if not abs(goals[t, k]) < 1e7:
             return False
     return True
 
