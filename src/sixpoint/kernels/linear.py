@@ -208,7 +208,8 @@ def solve_damped(small, count, rank, right, answer, largest, threshold):
     """Damped least squares: answer (rank,) minimises |L y - right|^2 + lambda^2 |y|^2.
 
     L = small[:count, :rank] is destroyed; small[right, :count] is the right side, the answer is written to
-    small[answer, :rank]. Lambda bounds the norm of the answer by ``largest`` (``damping``).
+    small[answer, :rank]. Lambda bounds the norm of the answer by ``largest`` (``damping``). The last row but
+    one of ``small`` holds the order of the pivots that ``extend_basis`` wrote.
     """
     if rank == count and solve_triangular(small, count, right, answer, largest):
         return

@@ -192,6 +192,8 @@ def _obstacle(body: Articulation, task: ObstacleTask, k: int) -> list[Block]:
 
 def _balance(body: Articulation, task: BalanceTask, k: int) -> Block:
     step = CHAIN_SHARE
+    if not 0 <= task.margin < np.inf:
+        raise SixpointError(f"{task.label}: the margin is a length from 0 [m], got {task.margin}")
     if task.target == "point":
         return _block(packing.BALANCE_POINT, task, k, 2, 0, task.level, step)
     if task.target != "polygon":
@@ -220,7 +222,12 @@ def _coupling(body: Articulation, task: CouplingTask, k: int) -> Block:
 def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
     joint, offset = _point(body, task.at, task.offset)
     limb = find_limb(body, task, joint, offset)
-    forms = {"tangent": 0, "exponential": packing.EXPONENTIAL, "hinge": packing.HINGE_ONLY}
+    forms = {
+        "tangent": 0,
+        "exponential": packing.EXPONENTIAL,
+        "hinge": packing.HINGE_ONLY,
+        "secant": packing.SECANT,
+    }
     if task.form not in forms:
         raise SixpointError(f"{task.label}: the form is one of {', '.join(forms)}; got {task.form!r}")
     common = {
@@ -238,7 +245,9 @@ def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
         _block(packing.FLEXT, task, k, 1, joint, task.level, step, **common),
         _block(packing.TANGENTIAL, task, k, 2, joint, across, step, **common),
     ]
-    if task.drag:
+    if task.drag or task.form == "secant":
+        if task.drag:
+            common["option"] |= packing.FOLLOW
         level = task.level + 2 if task.drag_level is None else task.drag_level
         blocks.append(_block(packing.DRAG, task, k, 1, joint, level, step, **common))
     return blocks

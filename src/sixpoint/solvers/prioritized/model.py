@@ -189,6 +189,9 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
         raise SixpointError("no tasks; give at least one, such as PositionTask('l_wrist')")
     postures = [task for task in tasks if isinstance(task, PostureTask)]
     others = [task for task in tasks if not isinstance(task, PostureTask)]
+    strangers = [type(task).__name__ for task in tasks if not isinstance(task, Task)]
+    if strangers:
+        raise SixpointError(f"tasks are PositionTask, FlextTask and so on; got {listed(strangers)}")
     names = Counter(task.label for task in others)
     twice = [name for name, count in names.items() if count > 1]
     if twice:
@@ -199,7 +202,7 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
         levels = [task.level]
         if isinstance(task, FlextTask):
             levels += [k for k in (task.tangential_level, task.drag_level) if k is not None]
-        if any(int(k) != k or k < 0 for k in levels):
+        if any(not (np.isfinite(k) and int(k) == k and k >= 0) for k in levels):
             raise SixpointError(f"{task.label}: levels are whole numbers from 0, got {levels}")
         if not (np.isfinite(task.weight) and task.weight > 0):
             raise SixpointError(f"{task.label}: the weight is a positive number, got {task.weight}")

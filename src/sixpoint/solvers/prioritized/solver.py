@@ -76,7 +76,7 @@ class PrioritizedIK:
         iterations: int = 20,
         cold_iterations: int = 50,
         least_iterations: int = 1,
-        max_angle: float = 0.35,
+        max_angle: float = 1.0,
         max_shift: float = 0.1,
         rank_threshold: float = 1e-4,
     ) -> None:
@@ -84,6 +84,11 @@ class PrioritizedIK:
             raise SixpointError(f"the gain is a number above 0, at most 1; got {gain}")
         if not 0 <= least_iterations <= iterations:
             raise SixpointError("iterations are whole numbers, at least least_iterations >= 0")
+        for option, value in (("max_angle", max_angle), ("max_shift", max_shift)):
+            if not 0 < value < np.inf:
+                raise SixpointError(f"{option} is a positive number, got {value}")
+        if not 0 <= rank_threshold < 1:
+            raise SixpointError(f"rank_threshold is a share from 0, below 1; got {rank_threshold}")
         self.body = Articulation.of(body, dofs)
         self.tasks, self.posture = check_tasks(self.body, tasks)
         self._settings = Settings(

@@ -212,8 +212,9 @@ class FlextTask(Task):
         tangential_level: Level of the two other directions; by default the next one.
         drag: Let the rest of the body follow when the goal is beyond the limb.
         drag_level: Level of that; by default two below ``level``.
-        form: Rows in the tangent space; "exponential": from exponential-map parameters, as in the paper;
-            "hinge": the middle joint alone carries the row, the root is left to the other two directions.
+        form: "tangent": the row in the tangent space; "exponential": from exponential-map parameters, as in the
+            paper; "secant": lower levels may move the limb's root, and the hinge answers at once (good for feet
+            that stand while the body moves); "hinge": the middle joint alone carries the row.
         predict: Allow for what higher levels do to root and end in the same step.
         root: Root of the limb, by default the next moving joint above the middle one.
         middle: Middle joint; by default the nearest hinge above.
@@ -223,7 +224,7 @@ class FlextTask(Task):
     tangential_level: int | None = None
     drag: bool = False
     drag_level: int | None = None
-    form: Literal["tangent", "exponential", "hinge"] = "tangent"
+    form: Literal["tangent", "exponential", "hinge", "secant"] = "tangent"
     predict: bool = True
     root: str | None = None
     middle: str | None = None

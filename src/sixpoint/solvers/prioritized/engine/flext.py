@@ -15,6 +15,7 @@ from sixpoint.kernels.jit import helper
 
 NULL = 1e-7  # a wanted change of length below this is none [m]
 VIRTUAL = 1e-3  # the virtual displacement, over the length of the limb
+SECANT = 0.02  # the least change of length that a secant is taken over, over the length of the limb
 MARGIN = 1e-6  # the limits 12 and 13 are strict
 
 
@@ -100,7 +101,7 @@ def solve_triangle(l1, l2, l3, sigma, alpha, wanted, standard, low, high):
     length = min(max(l3 + wanted, shortest), longest)
     beyond = l3 + wanted - length
     todo = 1.0
-    if abs(length - l3) < NULL:
+    if abs(length - l3) < max(NULL, 2.0 * MARGIN * (l1 + l2)):
         todo = 0.0
         step = VIRTUAL * (l1 + l2)
         length = l3 - step if l3 > 0.5 * (shortest + longest) else l3 + step
@@ -111,6 +112,24 @@ def solve_triangle(l1, l2, l3, sigma, alpha, wanted, standard, low, high):
     after = side * acosc((l1 * l1 - l2 * l2 + length * length) / (2.0 * l1 * length))
     bend = side * (pi - acosc((l1 * l1 + l2 * l2 - length * length) / (2.0 * l1 * l2)))
     return -wrapped(after - before), bend - sigma, todo, beyond
+
+
+@helper
+def secant(l1, l2, l3, sigma, alpha, wanted, standard, low, high):
+    """Change of L3 over that of the hinge's angle [m/rad] for a wanted change, or for a small one inward.
+
+    Away from full extension and flexion it is near the derivative, which vanishes there.
+    """
+    _, bend, todo, beyond = solve_triangle(l1, l2, l3, sigma, alpha, wanted, standard, low, high)
+    change = wanted - beyond
+    if todo <= 0.0 or abs(change) < SECANT * (l1 + l2):
+        change = SECANT * (l1 + l2)
+        change = -change if l3 > 0.5 * (abs(l1 - l2) + l1 + l2) else change
+        _, bend, todo, beyond = solve_triangle(l1, l2, l3, sigma, alpha, change, standard, low, high)
+        change -= beyond
+    if todo <= 0.0 or abs(bend) < 1e-9:
+        return 0.0
+    return change / bend
 
 
 @helper

@@ -20,7 +20,7 @@ from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 GAIN = 3e-5  # less than this is no gain [m]: 0.1 mm in three iterations
 QUIET = 0.15  # share of the speed of the posture while a goal is unknown: what it let go sinks slowly
-PATIENCE = 2  # steps without gain before going back
+FREE, PATIENCE = 6, 2  # steps without gain before going back: on the way, and when all are held
 SHORTEST = 0.02  # share of a step below which there is no more to gain
 
 
@@ -33,9 +33,11 @@ def evaluate(m, w, index, values, goals, state, settings):
 
 
 @helper
-def total_errors(m, w, index, values, totals):
-    """Write what errors exceed their tolerances by, summed per level [m]."""
-    for level in range(len(m.levels)):
+def total_errors(m, w, index, values, column, totals):
+    """Write what errors exceed their tolerances by, per level and weighted [m]; returns the sum."""
+    everything = 0.0
+    levels = len(m.levels)
+    for level in range(levels):
         totals[level] = 0.0
     for b in range(len(index)):
         if w.block[b, 2] == OFF:
@@ -44,7 +46,12 @@ def total_errors(m, w, index, values, totals):
         angular = kind == packing.ORIENTATION or kind == packing.LOOK_AT
         angular = angular or kind == packing.ALIGNMENT or kind == packing.COUPLING
         scale = RADIAN if angular else 1.0
-        totals[index[b, packing.LEVEL]] += scale * max(w.block[b, 0] - values[b, packing.TOLERANCE], 0.0)
+        excess = scale * values[b, packing.WEIGHT] * max(w.block[b, 0] - values[b, column], 0.0)
+        totals[index[b, packing.LEVEL]] += excess * excess
+        everything += excess
+    for level in range(levels):
+        totals[level] = totals[level] ** 0.5
+    return everything
 
 
 @helper
@@ -137,21 +144,23 @@ def copy_state(source, target, rows):
 def solve_frame(m, w, balls, index, values, goals, state, attractor, best, settings):
     """Improve the state for one frame of goals and leave the best one seen there; returns the iterations.
 
-    A step that brings no gain may be followed by one that does. After ``PATIENCE`` of them it goes on from
-    the best state with shorter steps: what bends away from its tangent then bends away less.
+    First it runs freely until nothing has been gained for a while: a fold may have to open before it turns
+    the right way, and a level may be off on the way by what still counts as met (1 cm). Then all levels are
+    held to their tolerance (1 mm): a step without gain is taken back and the next is shorter, so that what bends away
+    from its tangent bends away less, and wishes out of reach no longer pull at what is above them.
     """
     size, levels = 2 * len(m.parent) + 1, len(m.levels)
     fixed = len(w.row)
     least, totals = best[size:, 0], best[size:, 1]
     if settings.limits:
         hold_limits(m, balls, state)
-    share, failed, iterations, current = 1.0, 0, 0, True
+    share, failed, iterations, current, band = 1.0, 0, 0, True, packing.ACCEPT
     while True:
         evaluate(m, w, index, values, goals, state, settings)
-        total_errors(m, w, index, values, totals)
         off, on = count_off(w, index)
         if off > 0 and on == 0:
             break  # nothing is known: stand still
+        loose = total_errors(m, w, index, values, band, totals)
         met = all_within(w, index, values, packing.TOLERANCE)
         current = iterations == 0 or met or is_better(totals, least, levels)
         if current:
@@ -163,13 +172,22 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             failed += 1
         if (met and iterations >= settings.least) or 0 <= settings.most <= iterations:
             break
-        if failed >= PATIENCE:
+        back = False
+        if band == packing.ACCEPT:
+            back = loose == 0.0 or failed >= FREE or 3 * iterations >= 2 * settings.most
+        elif failed >= PATIENCE:
+            back = True
             share *= 0.3
-            if share < SHORTEST:
+            if share < SHORTEST and iterations >= settings.least:
                 break
-            copy_state(best, state, size)
-            evaluate(m, w, index, values, goals, state, settings)
+        if back:
+            if not current:
+                copy_state(best, state, size)
+                evaluate(m, w, index, values, goals, state, settings)
             failed, current = 0, True
+            if band == packing.ACCEPT:
+                band = packing.TOLERANCE
+                total_errors(m, w, index, values, band, least)
         posture = -1
         drifts = met if settings.posture_after else iterations < settings.drift
         if drifts and settings.posture_step > 0.0:

@@ -256,7 +256,10 @@ def build_block(m, w, index, values, b, goals, state, gain):
             u = vec.unit(e)
         if vec.dot(u, u) < 0.5:
             u = Y
+        outward = vec.sub(goal, vec.load(w.position, index[b, ROOT]))
         e = vec.reject(e, u)
+        if vec.norm(e) < 1e-6 and vec.dot(outward, u) < 0.0:  # right behind the root: any way round
+            e = vec.scale(vec.norm(outward), perpendicular(u))
         factor = weight * limited(vec.norm(e), gain, step)
         s = perpendicular(u)
         for k in range(2):
@@ -272,11 +275,20 @@ def build_block(m, w, index, values, b, goals, state, gain):
         side = values[b, packing.SIDE]
         _, _, _, beyond = flext.solve_triangle(l1, l2, l3, sigma, alpha, wish, side, low, high)
         u = vec.unit(vec.sub(end, root))
-        if abs(beyond) < 1e-6 or vec.dot(u, u) < 0.5:
+        secant = index[b, packing.OPTION] & packing.SECANT > 0
+        if vec.dot(u, u) < 0.5 or (abs(beyond) < 1e-6 and not secant):
             w.block[b, 2] = OFF
             return
+        # The body follows only as far as the limb points to the goal already.
+        beyond *= max(vec.dot(u, vec.unit(vec.sub(goal, root))), 0.0)
         w.row[r, 0] = weight * beyond * limited(abs(beyond), gain, step)
         add_row(m, w, r, joint, point, vec.scale(weight, u), NONE)
+        if secant:
+            if index[b, packing.OPTION] & packing.FOLLOW == 0:
+                w.row[r, 0] = 0.0
+            wish = wish * limited(abs(wish), gain, step)
+            slope = flext.secant(l1, l2, l3, sigma, alpha, wish, side, low, high)
+            w.rows[r, m.start[index[b, MIDDLE]]] = weight * slope
     elif kind == packing.ORIENTATION:
         q = qt.normalised((goals[t, 3], goals[t, 4], goals[t, 5], goals[t, 6]))
         here = qt.load(w.rotation, joint)

@@ -33,7 +33,18 @@ def mask(m, w, i):
 
 @helper
 def take_level(m, w, index, values, level, goals, state, settings, step, work, basis, size):
-    """Solve one level inside the null space of those above; returns the new size of the basis."""
+    """Solve one level inside the null space of those above; returns the new size of the basis.
+
+    FLEXT rows of the secant form go first: they move the limb, and the rows of its three directions occupy.
+    """
+    solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, True)
+    rank = solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, False)
+    return size + rank
+
+
+@helper
+def solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, leading):
+    """Solve the rows of a level that lead, or the others; returns their rank."""
     first, count = int(m.levels[level, 0]), int(m.levels[level, 1])
     used, longest = 0, 0.0
     capacity = w.small.shape[1]
@@ -43,16 +54,20 @@ def take_level(m, w, index, values, level, goals, state, settings, step, work, b
             continue
         r = index[b, packing.FIRST]
         special = index[b, packing.KIND] == packing.FLEXT
+        if leading != (special and index[b, packing.OPTION] & packing.SECANT > 0):
+            continue
         if special:
             t = index[b, packing.TASK]
             goal = (goals[t, 0], goals[t, 1], goals[t, 2])
             build_flext(m, w, index, values, b, goal, state, settings.gain, step)
+        held = index[b, packing.KIND] == packing.DRAG and index[b, packing.OPTION] & packing.SECANT > 0
         for k in range(index[b, packing.COUNT]):
             i = work + used
             linear.copy(w.rows, i, r + k)
             longest = max(longest, linear.dot(w.rows, i, i))
             left = w.row[r + k, 0]
-            if not special:
+            # FLEXT has allowed for higher levels; a secant row holds what the limb has been given.
+            if not special and not held:
                 left -= linear.dot(w.rows, r + k, step)
             w.small[right, used] = left
             mask(m, w, i)
@@ -60,15 +75,15 @@ def take_level(m, w, index, values, level, goals, state, settings, step, work, b
                 continue  # the hinge is at its limit: the root alone does not change the limb's length
             used += 1
     if used == 0 or used > capacity:
-        return size
+        return 0
     threshold = max(1e-6, settings.rank * sqrt(longest))
     rank = linear.extend_basis(w.rows, work, used, basis, size, w.small, threshold)
     if rank == 0:
-        return size
+        return 0
     linear.solve_damped(w.small, used, rank, right, answer, m.levels[level, 2], threshold)
     for k in range(rank):
         linear.add(w.rows, step, w.small[answer, k], basis + size + k)
-    return size + rank
+    return rank
 
 
 @helper

@@ -5,7 +5,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.kinematics import add_row, place_of
-from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, NONE, X, Y, Z, triple
+from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, NONE, WAITING, X, Y, Z, triple
 from sixpoint.solvers.prioritized.engine.step import mask
 
 
@@ -70,6 +70,10 @@ def report_yielding(m, w, index, values, goals, fixed, yielded):
         for other in range(len(index)):
             s = index[other, packing.TASK]
             held = w.block[other, 2] == EQUAL or w.block[other, 2] == ENFORCED
+            if w.block[other, 2] == WAITING and w.block[other, 1] < values[other, packing.TOLERANCE]:
+                held = (
+                    linear.dot(w.rows, index[other, packing.FIRST], wish) < 0.0
+                )  # in contact, and in the way
             if s == t or not held or index[other, packing.LEVEL] > index[b, packing.LEVEL]:
                 continue
             count = _own_rows(m, w, index, values, other, work)
