@@ -234,7 +234,7 @@ def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
         "offset": offset,
         "root": limb.root,
         "middle": limb.middle,
-        "option": forms[task.form] | (packing.PREDICT if task.predict else 0),
+        "option": forms[task.form] | task.predict * packing.PREDICT | task.drag * packing.FOLLOW,
         "side": limb.side,
         "low": limb.low,
         "high": limb.high,
@@ -246,8 +246,6 @@ def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
         _block(packing.TANGENTIAL, task, k, 2, joint, across, step, **common),
     ]
     if task.drag or task.form == "secant":
-        if task.drag:
-            common["option"] |= packing.FOLLOW
         level = task.level + 2 if task.drag_level is None else task.drag_level
         blocks.append(_block(packing.DRAG, task, k, 1, joint, level, step, **common))
     return blocks

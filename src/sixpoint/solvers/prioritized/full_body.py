@@ -12,13 +12,13 @@ from sixpoint.body.motion import Pose
 from sixpoint.body.rotations import from_axis_angle, mul
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.prioritized.goals import FAR
 from sixpoint.solvers.prioritized.tasks import FlextTask, PositionTask, PostureTask, Task
 
 Array = NDArray[np.float64]
 
 X, Z = np.eye(3)[[0, 2]]
 
-FAR = 1e7  # a position farther away is unknown [m], as in Sequential IK
 ELBOW, SHOULDER_BACK, SHOULDER_OUT, KNEE, HIP = np.radians([20.0, 10.0, 10.0, 15.0, 8.0])
 """Relaxed standing: "elbows slightly bent and backward, knees slightly bent and forward".
 

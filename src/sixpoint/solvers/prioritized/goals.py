@@ -1,4 +1,7 @@
-"""Goals of a frame as an array: position and rotation (7) of every task, NaN where it is off."""
+"""Goals of a frame as an array: position and rotation (7) of every task.
+
+Infinity where it is off, NaN where it is unknown.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,9 @@ from sixpoint.solvers.prioritized.tasks import Task
 Array = NDArray[np.float64]
 Goals = Mapping[str, ArrayLike] | ArrayLike
 
+FAR = 1e7  # a position farther away is unknown [m], as in Sequential IK
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
-UNKNOWN = (np.nan, np.nan, np.nan, *UNTURNED)
+UNTURNED_OFF = (np.inf, np.inf, np.inf, *UNTURNED)
 
 
 class GoalTable:
@@ -26,11 +30,11 @@ class GoalTable:
         self.default = np.zeros((len(tasks), 7))
         self.default[:, 6] = 1.0
         for k in self.rows:
-            self.default[k] = np.nan
+            self.default[k] = np.inf
             if tasks[k].goal is not None:
                 self._write(self.default[k], tasks[k].goal, tasks[k].label)
         self._unturned = self.default.copy()
-        self._unturned[np.isnan(self.default[:, 3])] = UNKNOWN
+        self._unturned[np.isinf(self.default[:, 3])] = UNTURNED_OFF
         together = self.rows == list(range(len(self.rows)))
         self._places = slice(len(self.rows)) if together else np.array(self.rows, int)
 
@@ -48,13 +52,13 @@ class GoalTable:
         except (TypeError, ValueError):
             raise self._wrong_shape(type(goals).__name__) from None
         out = self._start_of(rows.shape).copy()
-        out[self._places, : rows.shape[1]] = rows
+        out[self._places, : rows.shape[1]] = np.where(np.abs(rows) < FAR, rows, np.nan)
         return out
 
     def compute_frames(self, goals: Array) -> Array:
         """Frames (F, T, 7) from an array (F, G, 3) or (F, G, 7)."""
         out = np.tile(self._start_of(goals.shape[1:]), (len(goals), 1, 1))
-        out[:, self._places, : goals.shape[2]] = goals
+        out[:, self._places, : goals.shape[2]] = np.where(np.abs(goals) < FAR, goals, np.nan)
         return out
 
     def _start_of(self, shape: tuple[int, ...]) -> Array:
@@ -74,18 +78,22 @@ class GoalTable:
 
     @staticmethod
     def _write(row: Array, value: ArrayLike | None, name: str) -> None:
-        """Write a position (3,), a rotation (4,) or both (7,) into a row of seven."""
+        """Write a position (3,), a rotation (4,) or both (7,) into a row of seven; None is off."""
+        if value is None:
+            row[:] = np.inf
+            return
         try:
             goal = np.asarray(value, float)
         except (TypeError, ValueError):
             goal = np.zeros(0)
+        goal = np.where(np.abs(goal) < FAR, goal, np.nan)
         if goal.shape == (3,):
             row[:3] = goal
-            if np.isnan(row[3:]).any():
+            if np.isinf(row[3:]).any():
                 row[3:] = UNTURNED
         elif goal.shape == (4,):
             row[3:] = goal
-            if np.isnan(row[:3]).any():
+            if np.isinf(row[:3]).any():
                 row[:3] = 0.0
         elif goal.shape == (7,):
             row[:] = goal

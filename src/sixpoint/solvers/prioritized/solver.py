@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -163,11 +164,12 @@ class PrioritizedIK:
         return self._goals.names
 
     def compute_goals(self, goals: Goals) -> Array:
-        """One frame of goals as (T, 7): position and rotation of every task, NaN where it is off.
+        """One frame of goals as (T, 7): position and rotation of every task, not finite where it is off.
 
         Args:
-            goals: Name -> position (3,), rotation (4,) or both (7,); names left out keep the task's own
-                goal, or are off. Or an array (G, 3) or (G, 7), a row per name in ``goal_names``.
+            goals: Name -> position (3,), rotation (4,) or both (7,), or None for off; names left out keep
+                the task's own goal, if it has one. Or an array (G, 3) or (G, 7), a row per name in
+                ``goal_names``.
 
         Raises:
             TargetError: An unknown name, or a wrong shape; the message lists names or shapes.
@@ -263,9 +265,9 @@ class PrioritizedIK:
         frames = len(goals)
         parts = []
         step = CHUNK if progress else frames
-        for first in range(0, frames, step):
-            part = slice(first, min(first + step, frames))
-            settings = self._cold_settings if first == 0 and not len(starts) else self._settings_at(1 / rate)
+        cold = 0 if len(starts) else 1
+        for part in _parts(frames, step, cold):
+            settings = self._cold_settings if part.stop == cold else self._settings_at(1 / rate)
             parts.append(self._engine.run(goals[part], starts[part], state, self._attractor, settings))
             if progress:
                 progress(part.stop)
@@ -334,3 +336,9 @@ class PrioritizedIK:
         names = (*self.names, "joint limits")
         found = {name: np.flatnonzero(row > SHARE) for name, row in zip(names, shares, strict=False)}
         return {name: tuple(names[k] for k in held) for name, held in found.items() if len(held)}
+
+
+def _parts(frames: int, step: int, cold: int) -> list[slice]:
+    """Slices of at most ``step`` frames; the first ``cold`` frames are one of their own."""
+    edges = [0, *range(cold, frames, step), frames]
+    return [slice(a, b) for a, b in pairwise(edges) if a < b]

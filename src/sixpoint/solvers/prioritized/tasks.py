@@ -5,7 +5,8 @@ joint or a site of the rig by name; ``offset`` shifts it to a point fixed to tha
 goal and whether the task is active are not part of it: they are given frame by frame. ``goal`` is the value
 for frames that give none.
 
-A goal is a frame: a position (3,) [m], a rotation (4,) xyzw, or both (7,). NaN switches the task off.
+A goal is a frame: a position (3,) [m], a rotation (4,) xyzw, or both (7,). A task without a goal is off; NaN
+says that the goal is unknown, which is off too, and the frame is LOST.
 """
 
 from __future__ import annotations
@@ -212,9 +213,9 @@ class FlextTask(Task):
         tangential_level: Level of the two other directions; by default the next one.
         drag: Let the rest of the body follow when the goal is beyond the limb.
         drag_level: Level of that; by default two below ``level``.
-        form: "tangent": the row in the tangent space; "exponential": from exponential-map parameters, as in the
-            paper; "secant": lower levels may move the limb's root, and the hinge answers at once (good for feet
-            that stand while the body moves); "hinge": the middle joint alone carries the row.
+        form: "tangent": the row in the tangent space; "exponential": from exponential-map parameters, as in
+            the paper; "secant": lower levels may move the limb's root, and the hinge answers at once (good
+            for feet that stand while the body moves); "hinge": the middle joint alone carries the row.
         predict: Allow for what higher levels do to root and end in the same step.
         root: Root of the limb, by default the next moving joint above the middle one.
         middle: Middle joint; by default the nearest hinge above.

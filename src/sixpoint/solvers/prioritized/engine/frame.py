@@ -76,14 +76,23 @@ def count_off(w, index):
 
 
 @helper
-def is_better(totals, best, levels):
-    """Whether errors are smaller by enough to matter, the most important level first."""
+def is_better(totals, best, levels, margin):
+    """Whether errors are smaller by more than a margin [m], the most important level first."""
     for level in range(levels):
-        if totals[level] < best[level] - GAIN:
+        if totals[level] < best[level] - margin:
             return True
-        if totals[level] > best[level] + GAIN:
+        if totals[level] > best[level] + margin:
             return False
     return False
+
+
+@helper
+def first_off(totals, levels):
+    """The most important level whose errors exceed their tolerances."""
+    for level in range(levels):
+        if totals[level] > 0.0:
+            return level
+    return levels
 
 
 @helper
@@ -114,7 +123,7 @@ def posture_wish(m, w, state, attractor, step, cap, row):
 
 
 @helper
-def limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture):
+def limited_step(m, w, balls, index, values, goals, state, settings, free, fixed, posture):
     """The clamping loop: solve, turn what is violated into equalities, solve again; returns the rank."""
     step, work = fixed + 1, fixed + 3
     basis = work + w.small.shape[1]
@@ -123,7 +132,7 @@ def limited_step(m, w, balls, index, values, goals, state, settings, fixed, post
     size = 0
     for _ in range(len(m.hinges) + len(index) + 2):
         size = prioritized_step(
-            m, w, index, values, goals, state, settings, fixed, step, posture, work, basis
+            m, w, index, values, goals, state, settings, free, fixed, step, posture, work, basis
         )
         violated = enforce_approaches(w, index, values, step)
         if settings.limits and lock_violations(m, w, balls, state, step, fixed):
@@ -146,15 +155,16 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
 
     First it runs freely until nothing has been gained for a while: a fold may have to open before it turns
     the right way, and a level may be off on the way by what still counts as met (1 cm). Then all levels are
-    held to their tolerance (1 mm): a step without gain is taken back and the next is shorter, so that what bends away
-    from its tangent bends away less, and wishes out of reach no longer pull at what is above them.
+    held to their tolerance (1 mm): steps without gain are taken back and the next are shorter, so that what
+    bends away from its tangent bends away less; then also all levels below one that is off wait.
     """
     size, levels = 2 * len(m.parent) + 1, len(m.levels)
     fixed = len(w.row)
     least, totals = best[size:, 0], best[size:, 1]
     if settings.limits:
         hold_limits(m, balls, state)
-    share, failed, iterations, current, band = 1.0, 0, 0, True, packing.ACCEPT
+    share, failed, iterations, current = 1.0, 0, 0, True
+    band, careful = packing.ACCEPT, False
     while True:
         evaluate(m, w, index, values, goals, state, settings)
         off, on = count_off(w, index)
@@ -162,21 +172,21 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             break  # nothing is known: stand still
         loose = total_errors(m, w, index, values, band, totals)
         met = all_within(w, index, values, packing.TOLERANCE)
-        current = iterations == 0 or met or is_better(totals, least, levels)
+        gained = iterations == 0 or met or is_better(totals, least, levels, GAIN)
+        current = gained or is_better(totals, least, levels, 1e-9)
         if current:
             copy_state(state, best, size)
             for k in range(levels):
                 least[k] = totals[k]
-            failed, share = 0, min(2.0 * share, 1.0)
-        else:
-            failed += 1
+        failed = 0 if gained else failed + 1
+        share = min(2.0 * share, 1.0) if gained else share
         if (met and iterations >= settings.least) or 0 <= settings.most <= iterations:
             break
         back = False
         if band == packing.ACCEPT:
             back = loose == 0.0 or failed >= FREE or 3 * iterations >= 2 * settings.most
         elif failed >= PATIENCE:
-            back = True
+            back, careful = True, share < 1.0
             share *= 0.3
             if share < SHORTEST and iterations >= settings.least:
                 break
@@ -188,13 +198,16 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             if band == packing.ACCEPT:
                 band = packing.TOLERANCE
                 total_errors(m, w, index, values, band, least)
-        posture = -1
+        free, posture = levels, -1
+        if careful:  # all levels below the first one that is off only hold what they have
+            total_errors(m, w, index, values, band, totals)
+            free = first_off(totals, levels)
         drifts = met if settings.posture_after else iterations < settings.drift
-        if drifts and settings.posture_step > 0.0:
+        if drifts and free == levels and settings.posture_step > 0.0:
             posture = fixed + 2
             cap = settings.posture_cap * (QUIET if off else 1.0)
             posture_wish(m, w, state, attractor, settings.posture_step, cap, posture)
-        rank = limited_step(m, w, balls, index, values, goals, state, settings, fixed, posture)
+        rank = limited_step(m, w, balls, index, values, goals, state, settings, free, fixed, posture)
         if settings.most < 0:  # only the linear step was asked for; it is in the scratch rows
             return rank
         scale_step(m, w, settings, fixed + 1, share)
@@ -210,14 +223,23 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
 
 
 @helper
-def status_of(w, index, values, residual):
+def is_switched_off(goals, t):
+    """Whether a task is off on purpose, which infinity stands for."""
+    for k in range(7):
+        if abs(goals[t, k]) > 1e300:
+            return True
+    return False
+
+
+@helper
+def status_of(w, index, values, goals, residual):
     """Residual of every task, and how the frame went."""
     status = CONVERGED
     for t in range(len(residual)):
         residual[t] = 0.0
     for b in range(len(index)):
         t = index[b, packing.TASK]
-        if w.block[b, 2] == OFF and index[b, packing.KIND] != packing.DRAG:
+        if w.block[b, 2] == OFF and index[b, packing.KIND] != packing.DRAG and not is_switched_off(goals, t):
             status = LOST
         residual[t] = max(residual[t], w.block[b, 0])
         if status != LOST and w.block[b, 0] > values[b, packing.ACCEPT]:
@@ -264,7 +286,7 @@ def solve_prioritized(
                 for k in range(4):
                     state[i, k] = starts[f, i, k]
         iterations[f] = solve_frame(m, w, balls, index, values, goals[f], state, attractor, best, settings)
-        status[f] = status_of(w, index, values, residual[f])
+        status[f] = status_of(w, index, values, goals[f], residual[f])
         if f < len(yielded) and status[f] != CONVERGED:
             report_yielding(m, w, index, values, goals[f], len(w.row), yielded[f])
         for j in range(joints):

@@ -32,23 +32,26 @@ def mask(m, w, i):
 
 
 @helper
-def take_level(m, w, index, values, level, goals, state, settings, step, work, basis, size):
+def take_level(m, w, index, values, level, goals, state, settings, free, step, work, basis, size):
     """Solve one level inside the null space of those above; returns the new size of the basis.
 
     FLEXT rows of the secant form go first: they move the limb, and the rows of its three directions occupy.
     """
-    solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, True)
-    rank = solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, False)
+    solve_rows(m, w, index, values, level, goals, state, settings, free, step, work, basis, size, True)
+    rank = solve_rows(
+        m, w, index, values, level, goals, state, settings, free, step, work, basis, size, False
+    )
     return size + rank
 
 
 @helper
-def solve_rows(m, w, index, values, level, goals, state, settings, step, work, basis, size, leading):
+def solve_rows(m, w, index, values, level, goals, state, settings, free, step, work, basis, size, leading):
     """Solve the rows of a level that lead, or the others; returns their rank."""
     first, count = int(m.levels[level, 0]), int(m.levels[level, 1])
     used, longest = 0, 0.0
     capacity = w.small.shape[1]
     right, answer = w.small.shape[0] - 3, w.small.shape[0] - 1
+    wishes = level <= free
     for b in range(first, first + count):
         if w.block[b, 2] != EQUAL and w.block[b, 2] != ENFORCED:
             continue
@@ -59,13 +62,13 @@ def solve_rows(m, w, index, values, level, goals, state, settings, step, work, b
         if special:
             t = index[b, packing.TASK]
             goal = (goals[t, 0], goals[t, 1], goals[t, 2])
-            build_flext(m, w, index, values, b, goal, state, settings.gain, step)
+            build_flext(m, w, index, values, b, goal, state, settings.gain if wishes else 0.0, step)
         held = index[b, packing.KIND] == packing.DRAG and index[b, packing.OPTION] & packing.SECANT > 0
         for k in range(index[b, packing.COUNT]):
             i = work + used
             linear.copy(w.rows, i, r + k)
             longest = max(longest, linear.dot(w.rows, i, i))
-            left = w.row[r + k, 0]
+            left = w.row[r + k, 0] if wishes or special else 0.0
             # FLEXT has allowed for higher levels; a secant row holds what the limb has been given.
             if not special and not held:
                 left -= linear.dot(w.rows, r + k, step)
@@ -87,12 +90,12 @@ def solve_rows(m, w, index, values, level, goals, state, settings, step, work, b
 
 
 @helper
-def prioritized_step(m, w, index, values, goals, state, settings, fixed, step, posture, work, basis):
-    """Coordinate changes of all levels and of the posture into row ``step``."""
+def prioritized_step(m, w, index, values, goals, state, settings, free, fixed, step, posture, work, basis):
+    """Coordinate changes of all levels and of the posture into row ``step``; below ``free`` levels hold."""
     linear.copy(w.rows, step, fixed)
     size = 0
     for level in range(len(m.levels)):
-        size = take_level(m, w, index, values, level, goals, state, settings, step, work, basis, size)
+        size = take_level(m, w, index, values, level, goals, state, settings, free, step, work, basis, size)
     if posture >= 0:
         linear.copy(w.rows, work, posture)
         mask(m, w, work)
