@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 METRES, RADIANS = 1e-3, 1e-2
 """Errors at which iterating stops, by default."""
 ACCEPTED = 10.0
-"""A frame counts as met within so many times the tolerance: 1 cm, as in Unzueta et al. 2008, section 9."""
+"""A frame counts as met within so many times that: 1 cm, as in Unzueta et al. 2008, section 9."""
 ROTATION_STEP = 0.3
 CHAIN_SHARE = 0.1
 """Largest wanted change of one iteration: 10 % of the driving chain (Boulic and Raunhardt 2009), 0.3 rad."""
@@ -60,9 +60,10 @@ def _block(
     index[packing.KIND], index[packing.TASK], index[packing.COUNT] = kind, k, rows
     index[packing.JOINT] = joint
     angular = kind in (packing.ORIENTATION, packing.LOOK_AT, packing.ALIGNMENT, packing.COUPLING)
-    tolerance = task.tolerance or (RADIANS if angular else METRES)
+    usual = RADIANS if angular else METRES
+    tolerance = task.tolerance or usual
     values[packing.WEIGHT], values[packing.STEP] = task.weight, step
-    values[packing.TOLERANCE], values[packing.ACCEPT] = tolerance, ACCEPTED * tolerance
+    values[packing.TOLERANCE], values[packing.ACCEPT] = tolerance, max(ACCEPTED * usual, tolerance)
     for name, value in extra.items():
         column = getattr(packing, name.upper())
         if name in ("root", "middle", "shape", "option"):

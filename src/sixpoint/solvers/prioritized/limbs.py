@@ -43,6 +43,8 @@ def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) ->
         middle = _named(body, task, task.middle, path)
         if not isinstance(body.dofs[middle], Hinges):
             raise SixpointError(f"{task.label}: the middle joint {task.middle!r} is not a hinge")
+    elif (role := _role_middle(body, path)) is not None:
+        middle = role
     else:
         hinges = [j for j in path if isinstance(body.dofs[j], Hinges) and _lever(body, j, point) > SHORT]
         if not hinges:
@@ -67,6 +69,14 @@ def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) ->
     assert isinstance(dof, Hinges)
     low, high = max(float(dof.lower[0]), -np.pi), min(float(dof.upper[0]), np.pi)
     return Limb(root, middle, float(sum(lengths)), -1.0 if -low > high else 1.0, low, high)
+
+
+def _role_middle(body: Articulation, path: list[int]) -> int | None:
+    """The elbow or knee of a figure above a place on its hand or foot."""
+    if body.figure is None:
+        return None
+    limbs = body.figure.roles.limbs
+    return next((m for _, m, end in limbs if end in path and isinstance(body.dofs[m], Hinges)), None)
 
 
 def _named(body: Articulation, task: FlextTask, name: str, path: list[int]) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.solvers.prioritized.engine import packing
-from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL
+from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, EQUAL
 from sixpoint.solvers.prioritized.model import Lowered
 
 Array = NDArray[np.float64]

@@ -40,6 +40,7 @@ CHUNK = 64  # frames between two reports of progress
 FRAME = 1 / 60  # the time in which the posture takes its step [s]
 POSTURE_STEP = 0.1  # largest turn of a joint towards the posture in one iteration [rad]
 POSTURE_SPEED = 6.0  # the same from frame to frame [rad/s]
+TRACE = 0.05  # less than this holds nothing
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
 log = logging.getLogger("sixpoint")
@@ -334,8 +335,13 @@ class PrioritizedIK:
     def _gave_way(self, shares: Array) -> dict[str, tuple[str, ...]]:
         """Unmet task -> what holds the motion it needs."""
         names = (*self.names, "joint limits")
-        found = {name: np.flatnonzero(row > SHARE) for name, row in zip(names, shares, strict=False)}
-        return {name: tuple(names[k] for k in held) for name, held in found.items() if len(held)}
+        found = {}
+        for name, row in zip(names, shares, strict=False):
+            if row.any():  # most important cause first; at least the largest, if anything holds it at all
+                order = np.argsort(-row, kind="stable")
+                held = [k for k in order if row[k] > SHARE] or [k for k in order[:1] if row[k] > TRACE]
+                found[name] = tuple(names[k] for k in held)
+        return found
 
 
 def _parts(frames: int, step: int, cold: int) -> list[slice]:

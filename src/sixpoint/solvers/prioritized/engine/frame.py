@@ -13,8 +13,9 @@ from sixpoint.solvers.prioritized.engine.limits import (
     release,
 )
 from sixpoint.solvers.prioritized.engine.packing import BALL, unpack_model, unpack_scratch, unpack_settings
-from sixpoint.solvers.prioritized.engine.rows import OFF, RADIAN, build_block
+from sixpoint.solvers.prioritized.engine.rows import build_block
 from sixpoint.solvers.prioritized.engine.step import prioritized_step, scale_step
+from sixpoint.solvers.prioritized.engine.wishes import OFF, RADIAN
 from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
@@ -186,8 +187,11 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         if band == packing.ACCEPT:
             back = loose == 0.0 or failed >= FREE or 3 * iterations >= 2 * settings.most
         elif failed >= PATIENCE:
-            back, careful = True, share < 1.0
-            share *= 0.3
+            back = True
+            if share < 1.0 and not careful:
+                careful, share = True, 1.0
+            else:
+                share *= 0.3
             if share < SHORTEST and iterations >= settings.least:
                 break
         if back:

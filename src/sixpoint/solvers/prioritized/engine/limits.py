@@ -11,7 +11,7 @@ from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import FORWARD, SIDE, TWIST, clamp, swing_limit
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
-from sixpoint.solvers.prioritized.engine.rows import ENFORCED, WAITING
+from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, WAITING
 
 TOLERANCE = 1e-9
 DIFFERENCE = 1e-4  # step of the numerical gradient [rad]

@@ -12,8 +12,9 @@ from sixpoint.kernels import linear
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine import packing
+from sixpoint.solvers.prioritized.engine.limb_rows import build_flext
 from sixpoint.solvers.prioritized.engine.packing import BALL
-from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, build_flext
+from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, EQUAL
 
 
 @helper

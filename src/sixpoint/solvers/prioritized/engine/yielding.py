@@ -5,8 +5,8 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.kinematics import add_row, place_of
-from sixpoint.solvers.prioritized.engine.rows import ENFORCED, EQUAL, NONE, WAITING, X, Y, Z, triple
 from sixpoint.solvers.prioritized.engine.step import mask
+from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, EQUAL, NONE, WAITING, X, Y, Z, triple
 
 
 @helper
