@@ -28,13 +28,6 @@ from prioritized_bodies import (
 
 ALL = pytest.mark.parametrize("make", BODIES, ids=lambda make: make.__name__)
 
-CONTACT = pytest.mark.xfail(
-    strict=True, reason="a one-sided task in contact is waiting, so it is never named"
-)
-STUCK = pytest.mark.xfail(
-    strict=True, reason="stops 5 cm short: steps that cost higher levels a little are undone"
-)
-
 # --- tasks do what they say ------------------------------------------------------------------------
 
 
@@ -96,7 +89,6 @@ def test_the_floor_is_not_penetrated():
     assert solution.status is sp.Status.UNREACHABLE
 
 
-@CONTACT
 def test_the_floor_is_named():
     """What the hand gave way to is the floor it rests on."""
     _, solution, *_ = below_the_floor()
@@ -109,7 +101,10 @@ def inside(hull: ConvexHull, point: np.ndarray) -> float:
 
 
 def test_balance_keeps_the_mass_above_the_feet():
-    """Reaching forward the mass stays 2 cm inside the feet's hull; without the task it leaves it."""
+    """Reaching forward the mass stays well inside the feet's hull; without the task it leaves it.
+
+    The heels lift, and a hull too narrow for the margin of 2 cm is shrunk by half of what it has.
+    """
     body = figure()
     tasks, goals = standing(body)
     reach = sp.PositionTask("l_wrist", level=1)
@@ -119,7 +114,7 @@ def test_balance_keeps_the_mass_above_the_feet():
         _, positions, world = solve(body, [*tasks, *more, reach], goals)
         centre = mass_centre(body, positions[None], world[None])[0, [0, 2]]
         margins.append(inside(support(body, positions, world), centre))
-    assert margins[0] > 0.02 - 2e-3
+    assert margins[0] > 0.015
     assert margins[1] < 0.0
 
 
@@ -133,7 +128,6 @@ def test_balance_above_a_point():
     np.testing.assert_allclose(centre[[0, 2]], [0.05, 0.08], atol=1.5e-3)
 
 
-@STUCK
 def test_a_balanced_reach_goes_on_to_its_goal():
     """Feet and balance held, a hand reaches 0.7 m forward: plain repeated steps get there within 30."""
     body = figure()

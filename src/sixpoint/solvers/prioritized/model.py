@@ -191,7 +191,7 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
     others = [task for task in tasks if not isinstance(task, PostureTask)]
     strangers = [type(task).__name__ for task in tasks if not isinstance(task, Task)]
     if strangers:
-        raise SixpointError(f"tasks are PositionTask, FlextTask and so on; got {listed(strangers)}")
+        raise SixpointError(f"{listed(strangers)} is not a task; tasks are PositionTask, FlextTask and so on")
     names = Counter(task.label for task in others)
     twice = [name for name, count in names.items() if count > 1]
     if twice:
