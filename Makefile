@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check benchmark results peers clean
+.PHONY: demo test check benchmark results peers study examples clean
 
 demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
 	$(BIN)/sixpoint demo --force
@@ -26,6 +26,13 @@ results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/
 peers: $(VENV)/run.stamp  ## Time six targets on hinges beside mink and rewrite docs/results.md
 	@$(PIP) install --editable '.[bench]'
 	$(BIN)/python benchmarks/peers.py --docs
+
+study: $(VENV)/run.stamp  ## Make the figures of the FLEXT paper again and rewrite docs/flext
+	$(BIN)/sixpoint study flext --out docs/flext --force
+
+examples: $(VENV)/run.stamp  ## Run the examples and rewrite docs/shelf_reach
+	$(BIN)/python examples/shelf_reach.py --out docs/shelf_reach --force
+	rm docs/shelf_reach/*.bvh
 
 clean:
 	rm -rf $(VENV) demo

@@ -19,6 +19,7 @@ from sixpoint.cli.demo import demo
 from sixpoint.cli.info import info
 from sixpoint.cli.reconstruct import reconstruct
 from sixpoint.cli.screen import Screen, messages
+from sixpoint.cli.study import study
 from sixpoint.errors import SixpointError
 
 HELP = """Pose a whole human figure from six tracked points: pelvis, head, wrists and ankles.
@@ -32,7 +33,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, convert, info):
+    for command in (demo, reconstruct, convert, info, study):
         app.command(command)
     return app
 

@@ -2,21 +2,18 @@
 
 Bodies are drawn as tapered capsules in an orthographic view, far parts first. The truth is a soft grey
 body, the result a coloured skeleton on top of it: what differs sticks out. Works for any figure; joints
-without a role are left out. Uses Matplotlib's objects, never pyplot; files are written whole or not at all.
+without a role are left out.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike, NDArray
@@ -25,15 +22,24 @@ from scipy.spatial import ConvexHull
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
-from sixpoint.errors import SixpointError
+from sixpoint.study.canvas import (
+    DPI,
+    GHOST,
+    INK,
+    LEFT,
+    RIGHT,
+    SERIES,
+    SOFT,
+    TRUNK,
+    WIDTH,
+    add_heading,
+    add_legend,
+    save_canvas,
+    style_axes,
+)
 
 Array = NDArray[np.float64]
 
-INK, SOFT, GHOST = "#22303c", "#8793a0", "#d3d9df"
-LEFT, RIGHT, TRUNK = "#1f8a9e", "#e07a3f", "#44546a"
-SERIES = (LEFT, RIGHT, "#6b5ca5", "#5a9a4a", "#c14b6a", "#44546a", "#b8952f", "#8793a0")
-DPI = 150
-WIDTH = 1600 / DPI  # [inch]
 GAP = 0.16  # between the figures of a strip, in units of the figure
 VIEW_YAW, VIEW_PITCH = np.radians(38), np.radians(9)
 
@@ -70,10 +76,10 @@ def draw_comparison(
         ``path``.
     """
     shown = _spread(len(truth)) if frames is None else list(frames)
-    canvas = _film(figure, (truth, result), shown, below=1.75)
+    canvas = film(figure, (truth, result), shown, below=1.75)
     error = 100 * compute_distances(figure, truth, result)
-    _heading(canvas, title or truth.name, f"mean {error.mean():.1f} cm,  worst {error.max():.1f} cm")
-    _legend(canvas)
+    add_heading(canvas, title or truth.name, f"mean {error.mean():.1f} cm,  worst {error.max():.1f} cm")
+    add_legend(canvas, ((GHOST, "truth"), (LEFT, "left side"), (RIGHT, "right side"), (INK, "six points")))
     height = canvas.get_figheight()
     axes = canvas.add_axes((0.055, 0.5 / height, 0.925, 1.2 / height))
     times = np.arange(len(truth)) / truth.rate
@@ -82,8 +88,8 @@ def draw_comparison(
     axes.axhline(error.mean(), color=INK, lw=0.9, ls=(0, (4, 3)))
     axes.plot(times[shown], error[shown], "o", color=INK, ms=5, mec="white", mew=1.0, clip_on=False, zorder=5)
     axes.set_ylim(0, max(1.12 * error.max(), 0.1))
-    _style(axes, times, "joint distance [cm]")
-    return _save(canvas, path)
+    style_axes(axes, times, "joint distance [cm]")
+    return save_canvas(canvas, path)
 
 
 def draw_poses(
@@ -107,9 +113,9 @@ def draw_poses(
         ``path``.
     """
     shown = _spread(len(motion)) if frames is None else list(frames)
-    canvas = _film(figure, (motion,), shown, below=0.0)
-    _heading(canvas, title or motion.name, f"{motion.duration:.1f} s at {motion.rate:g} Hz")
-    return _save(canvas, path)
+    canvas = film(figure, (motion,), shown, below=0.0)
+    add_heading(canvas, title or motion.name, f"{motion.duration:.1f} s at {motion.rate:g} Hz")
+    return save_canvas(canvas, path)
 
 
 def draw_error_curves(
@@ -137,12 +143,12 @@ def draw_error_curves(
         axes.plot(times, values, color=SERIES[k % len(SERIES)], lw=1.8, ls=dashes, label=name)
     ends = np.concatenate([np.asarray(times, float) for times, _ in curves.values()] or [np.zeros(1)])
     axes.set_ylim(bottom=0)
-    _style(axes, ends, ylabel)
+    style_axes(axes, ends, ylabel)
     if curves:
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, labelcolor=INK, fontsize=9.5)
     if title:
-        _heading(canvas, title, "")
-    return _save(canvas, path)
+        add_heading(canvas, title, "")
+    return save_canvas(canvas, path)
 
 
 def compute_distances(figure: Figure, truth: Motion, result: Motion) -> Array:
@@ -210,27 +216,42 @@ def _parts(figure: Figure, positions: Array, world: Array, slim: bool) -> list[_
     return [*parts, part(TRUNK, [skull - 0.012 * unit * rot.mul_vec(up, [0, 1, 0]), skull], 0.085, 0.095)]
 
 
-def _camera(figure: Figure, motion: Motion, shown: Sequence[int]) -> Array:
-    """(3, 3) rows right, up and towards the viewer: three quarters from the front of the mean pose."""
+def _camera(figure: Figure, motion: Motion, shown: Sequence[int], turn: float) -> Array:
+    """(3, 3) rows right, up and towards the viewer: ``turn`` from the front of the mean pose."""
     across = motion.positions[shown][:, figure.roles.hip[0]] - motion.positions[shown][:, figure.roles.hip[1]]
     front = np.cross(across.mean(axis=0), [0, 1, 0])
-    yaw = np.arctan2(front[0], front[2]) + VIEW_YAW
+    yaw = np.arctan2(front[0], front[2]) + turn
     level = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
     toward = np.cos(VIEW_PITCH) * level + np.array([0.0, np.sin(VIEW_PITCH), 0.0])
     right = rot.unit(np.cross([0, 1, 0], toward))
     return np.stack([right, np.cross(toward, right), toward])
 
 
-def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below: float) -> Canvas:
-    """Bodies side by side over their times, on a canvas that has ``below`` inches left at its foot."""
+def film(
+    figure: Figure,
+    motions: Sequence[Motion],
+    shown: Sequence[int],
+    below: float,
+    *,
+    captions: Sequence[str] = (),
+    points: Array | None = None,
+    centre: ArrayLike | None = None,
+    yaw: float = VIEW_YAW,
+) -> Canvas:
+    """Bodies side by side over their times, on a canvas that has ``below`` inches left at its foot.
+
+    Instead of the times there may be ``captions``, instead of the six points others (F, n, 3), instead of the
+    pelvis a fixed ``centre`` (3,) [m]; ``yaw`` is the way of the viewer from the front, to the left [rad].
+    """
     unit, first = figure.height / 1.6, motions[0]
-    camera = _camera(figure, first, shown)
+    camera = _camera(figure, first, shown, yaw)
     places = _places(figure, *first.transforms)
     floor = float(places[..., 1].min())
-    targets = figure.targets(first).positions
+    targets = figure.targets(first).positions if points is None else points
     views = []
     for frame in shown:
-        origin = np.array([*first.positions[frame, figure.roles.pelvis]]) * [1, 0, 1] + [0, floor, 0]
+        middle = first.positions[frame, figure.roles.pelvis] if centre is None else np.asarray(centre)
+        origin = middle * [1, 0, 1] + [0, floor, 0]
         layers = []
         for motion in motions:
             positions, world = motion.transforms
@@ -250,11 +271,12 @@ def _film(figure: Figure, motions: Sequence[Motion], shown: Sequence[int], below
     axes = canvas.add_axes((0, below / total, 1, tall / total), xlim=(0, wide), ylim=(low, high))
     axes.axis("off")
     left = (wide - sum(widths)) / 2
-    for frame, (layers, points), edge, width in zip(shown, views, edges, widths, strict=True):
+    texts = captions or [f"{frame / first.rate:.2f} s" for frame in shown]
+    dotted = len(motions) > 1 or points is not None
+    for text, (layers, dots), edge, width in zip(texts, views, edges, widths, strict=True):
         shift = np.array([left + (width - edge[:, 0].max() - edge[:, 0].min()) / 2, 0.0])
-        _draw_body(axes, layers, points[:, :2] + shift if len(motions) > 1 else None, shift, camera, unit)
-        time = f"{frame / first.rate:.2f} s"
-        axes.text(left + width / 2, low + 0.02 * unit, time, ha="center", color=SOFT, size=9.5)
+        _draw_body(axes, layers, dots[:, :2] + shift if dotted else None, shift, camera, unit)
+        axes.text(left + width / 2, low + 0.02 * unit, text, ha="center", color=SOFT, size=9.5)
         left += width
     return canvas
 
@@ -292,46 +314,3 @@ def _outline(part: _Part, camera: Array) -> Array:
 def _spread(frames: int, count: int = 6) -> list[int]:
     """Frames in the middle of equal parts of a clip."""
     return sorted({int((k + 0.5) * frames / count) for k in range(count)})
-
-
-def _heading(canvas: Canvas, title: str, note: str) -> None:
-    y = 1 - 0.36 / canvas.get_figheight()
-    canvas.text(0.02, y, title, size=15, weight="bold", color=INK, va="center")
-    canvas.text(0.98, y, note, size=10.5, color=INK, va="center", ha="right")
-
-
-def _legend(canvas: Canvas) -> None:
-    y = 1 - 0.66 / canvas.get_figheight()
-    x = 0.02
-    items = ((GHOST, "truth"), (LEFT, "left side"), (RIGHT, "right side"), (INK, "six points"))
-    for colour, text in items:
-        canvas.text(x, y, "\u25cf", color=colour, size=11, va="center")
-        canvas.text(x + 0.014, y, text, color=SOFT, size=9.5, va="center")
-        x += 0.03 + 0.0062 * len(text)
-
-
-def _style(axes: Axes, times: Array, ylabel: str) -> None:
-    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-3))
-    axes.set_xlabel("time [s]", color=SOFT, size=9.5, labelpad=2)
-    axes.set_ylabel(ylabel, color=SOFT, size=9.5)
-    axes.tick_params(colors=SOFT, labelsize=9, length=0)
-    axes.grid(axis="y", color="#e6eaee", lw=0.8)
-    axes.set_axisbelow(True)
-    axes.spines[:].set_visible(False)
-    axes.spines["bottom"].set(visible=True, color="#c5ccd3")
-
-
-def _save(canvas: Canvas, path: str | Path) -> Path:
-    """Write a PNG beside its place, then move it there."""
-    path = Path(path)
-    FigureCanvasAgg(canvas)
-    picture = BytesIO()
-    canvas.savefig(picture, format="png")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(picture.getvalue())
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise SixpointError(f"{path}: the picture cannot be written: {error.strerror}") from error
-    return path
