@@ -14,7 +14,14 @@ from sixpoint.errors import FormatError
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
-from sixpoint.jobs.study_flext_body import REACH_METHODS, BodyRun, acceleration, reach, squat_and_kick
+from sixpoint.jobs.study_flext_body import (
+    FREE_METHODS,
+    REACH_METHODS,
+    BodyRun,
+    acceleration,
+    reach,
+    squat_and_kick,
+)
 from sixpoint.jobs.study_flext_limb import BENDS, GOALS, METHODS, LimbRun, flex_all, hand_angle, postures
 
 if TYPE_CHECKING:
@@ -91,7 +98,7 @@ def study_flext(out: Path, *, force: bool = False, progress: Progress = silent) 
         reaches += [reach(figure, name, budget) for name in REACH_METHODS]
         kicks += [squat_and_kick(figure, method, budget) for method in METHODS]
         progress("studying FLEXT", 3 + done, steps)
-    free = [reach(figure, name, BUDGETS[-1], held=False) for name in REACH_METHODS]
+    free = [reach(figure, name, BUDGETS[-1], held=False) for name in FREE_METHODS]
     progress("studying FLEXT", steps - 3, steps)
     draw_reach(figure, _traces(reaches[0]), _traces(reaches[2]), files[2])
     progress("studying FLEXT", steps - 2, steps)

@@ -55,6 +55,8 @@ HAND = {**HAND, 5.3: (-0.16, -0.78, 0.50), 6.6: (-0.20, 0.34, 0.40)}
 """The same for the reach: depth and pitch of the pelvis; the right wrist."""
 REACH_METHODS = {"plain": ("plain", "plain"), "FLEXT legs": ("FLEXT", "plain"), "FLEXT": ("FLEXT", "FLEXT")}
 """Name -> method of the legs and of the right arm."""
+FREE_METHODS = {**REACH_METHODS, "secant": ("secant", "secant")}
+"""The same where the pelvis is free: then also the secant form of FLEXT."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +156,7 @@ def reach(figure: Figure, name: str, budget: int, held: bool = True) -> BodyRun:
 
     Args:
         figure: The figure.
-        name: Of ``REACH_METHODS``.
+        name: Of ``FREE_METHODS``.
         budget: Most iterations a frame.
         held: Whether the pelvis has its goal; else it goes where the hand takes it.
     """
@@ -172,7 +174,7 @@ def reach(figure: Figure, name: str, budget: int, held: bool = True) -> BodyRun:
     }
     if held:
         goals |= {"pelvis": pelvis, "pelvis orientation": turn}
-    legs, arm = REACH_METHODS[name]
+    legs, arm = FREE_METHODS[name]
     tasks = [
         *(_pelvis() if held else []),
         *_feet(legs),
@@ -185,9 +187,11 @@ def reach(figure: Figure, name: str, budget: int, held: bool = True) -> BodyRun:
 
 
 def _place(at: str, level: int, method: str) -> Task:
-    """A position constraint, plain or FLEXT."""
+    """A position constraint, plain, FLEXT or its secant form."""
     if method == "FLEXT":
         return FlextTask(at, level=level, drag=True, tolerance=FINE)
+    if method == "secant":
+        return FlextTask(at, level=level, drag=True, tolerance=FINE, form="secant")
     return PositionTask(at, level=level, tolerance=FINE)
 
 

@@ -221,28 +221,27 @@ def _kick(study: FlextStudy) -> list[str]:
 
 
 def _free(study: FlextStudy) -> list[str]:
-    plain, flext = study.free[0], study.free[-1]
-    misses = (
-        f"the hand misses its goals by up to {1e3 * flext.miss:.0f} mm with FLEXT and by up to "
-        f"{1e3 * plain.miss:.0f} mm with plain constraints"
+    plain, flext, secant = (run for run in study.free if run.method in ("plain", "FLEXT", "secant"))
+    misses = ", ".join(
+        f"{1e3 * run.miss:.0f} mm {words}"
+        for run, words in (
+            (plain, "with plain constraints"),
+            (flext, "with FLEXT in the paper's form"),
+            (secant, "in its secant form"),
+        )
     )
-    limit = (
-        "FLEXT's row holds the knee against everything less important, so a leg whose foot is at its goal "
-        "cannot give way when the hand needs the pelvis lower. The knee could follow in the next iteration, "
-        "but the foot is off its goal before that, and such a posture counts as worse than the one before. "
-        "The paper tracks the full body with 24 markers; here, give the pelvis a goal above the legs."
+    verdict = (
+        "**A free pelvis is no problem:** the hand misses its goals by up to "
+        if flext.miss < CLOSE
+        else "**In the paper's form FLEXT does harm here:** the hand misses its goals by up to "
     )
-    if flext.miss < CLOSE:
-        text = f"A free pelvis is no problem: {misses}."
-    elif plain.miss < CLOSE:
-        text = f"**Here FLEXT does harm:** {misses}. {limit} Or hold the feet by plain constraints."
-    else:
-        text = f"**Neither manages this:** {misses}, though the feet stay. {limit}"
     return [
         *_section("The same reach with a free pelvis", None),
         "As before, but nothing tracks the pelvis: it goes where hand, balance and posture, all less "
         "important than the legs, take it.",
         *_table(BODY_COLUMNS, body_rows(study.free)),
-        text,
+        f"{verdict}{misses}. FLEXT's row occupies the knee, so that a leg whose foot is at its goal gives "
+        "way to the levels below only in the next iteration. The secant form lets the knee answer at once. "
+        "The paper tracks the full body with 24 markers, where the pelvis has goals above the legs.",
         "",
     ]

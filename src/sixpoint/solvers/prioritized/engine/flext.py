@@ -101,7 +101,9 @@ def solve_triangle(l1, l2, l3, sigma, alpha, wanted, standard, low, high):
     length = min(max(l3 + wanted, shortest), longest)
     beyond = l3 + wanted - length
     todo = 1.0
-    if abs(length - l3) < max(NULL, 2.0 * MARGIN * (l1 + l2)):
+    if (wanted > -NULL and l3 >= longest) or (wanted < NULL and l3 <= shortest):
+        length = l3  # at the end already; the margin of the strict limits is no reason to move
+    if abs(length - l3) < NULL:
         todo = 0.0
         step = VIRTUAL * (l1 + l2)
         length = l3 - step if l3 > 0.5 * (shortest + longest) else l3 + step

@@ -22,6 +22,7 @@ CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 GAIN = 3e-5  # less than this is no gain [m]: 0.1 mm in three iterations
 QUIET = 0.15  # share of the speed of the posture while a goal is unknown: what it let go sinks slowly
 FREE, PATIENCE = 6, 2  # steps without gain before going back: on the way, and when all are held
+ENOUGH = 9  # iterations of which the last third is for holding levels
 SHORTEST = 0.02  # share of a step below which there is no more to gain
 
 
@@ -185,7 +186,8 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
             break
         back = False
         if band == packing.ACCEPT:
-            back = loose == 0.0 or failed >= FREE or 3 * iterations >= 2 * settings.most
+            late = settings.most >= ENOUGH and 3 * iterations >= 2 * settings.most
+            back = loose == 0.0 or failed >= FREE or late
         elif failed >= PATIENCE:
             back = True
             if share < 1.0 and not careful:
