@@ -160,53 +160,51 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     held to their tolerance (1 mm): steps without gain are taken back and the next are shorter, so that what
     bends away from its tangent bends away less; then also all levels below one that is off wait.
     """
-    size, levels = 2 * len(m.parent) + 1, len(m.levels)
-    fixed = len(w.row)
+    size, levels, fixed = 2 * len(m.parent) + 1, len(m.levels), len(w.row)
     least, totals = best[size:, 0], best[size:, 1]
     if settings.limits:
         hold_limits(m, balls, state)
-    share, failed, iterations, current = 1.0, 0, 0, True
-    band, careful = packing.ACCEPT, False
+    share, failed, iterations, rank = 1.0, 0, 0, 0
+    band, careful, returned, finished = packing.ACCEPT, False, False, False
     while True:
         evaluate(m, w, index, values, goals, state, settings)
         off, on = count_off(w, index)
-        if off > 0 and on == 0:
-            break  # nothing is known: stand still
-        loose = total_errors(m, w, index, values, band, totals)
-        met = all_within(w, index, values, packing.TOLERANCE)
-        gained = iterations == 0 or met or is_better(totals, least, levels, GAIN)
-        current = gained or is_better(totals, least, levels, 1e-9)
-        if current:
-            copy_state(state, best, size)
-            for k in range(levels):
-                least[k] = totals[k]
-        failed = 0 if gained else failed + 1
-        share = min(2.0 * share, 1.0) if gained else share
-        if (met and iterations >= settings.least) or 0 <= settings.most <= iterations:
+        if finished or (off > 0 and on == 0):  # nothing is known: stand still
             break
-        back = False
-        if band == packing.ACCEPT:
-            late = settings.most >= ENOUGH and 3 * iterations >= 2 * settings.most
-            back = loose == 0.0 or failed >= FREE or late
-        elif failed >= PATIENCE:
-            back = True
-            if share < 1.0 and not careful:
-                careful, share = True, 1.0
-            else:
-                share *= 0.3
-            if share < SHORTEST and iterations >= settings.least:
-                break
-        if back:
-            if not current:
-                copy_state(best, state, size)
-                evaluate(m, w, index, values, goals, state, settings)
-            failed, current = 0, True
+        met = all_within(w, index, values, packing.TOLERANCE)
+        excess = total_errors(m, w, index, values, band, totals)
+        if returned:
+            returned = False
+            total_errors(m, w, index, values, band, least)
+        else:
+            gained = iterations == 0 or met or is_better(totals, least, levels, GAIN)
+            current = gained or is_better(totals, least, levels, 1e-9)
+            if current:
+                copy_state(state, best, size)
+                for k in range(levels):
+                    least[k] = totals[k]
+            failed = 0 if gained else failed + 1
+            share = min(2.0 * share, 1.0) if gained else share
+            finished = (met and iterations >= settings.least) or 0 <= settings.most <= iterations
             if band == packing.ACCEPT:
-                band = packing.TOLERANCE
-                total_errors(m, w, index, values, band, least)
+                late = settings.most >= ENOUGH and 3 * iterations >= 2 * settings.most
+                returned = excess == 0.0 or failed >= FREE or late
+                band = packing.TOLERANCE if returned else band
+            elif failed >= PATIENCE:
+                returned = True
+                if share < 1.0 and not careful:
+                    careful, share = True, 1.0
+                else:
+                    share *= 0.3
+                finished = finished or (share < SHORTEST and iterations >= settings.least)
+            if finished and current:
+                break
+            if finished or returned:
+                copy_state(best, state, size)
+                failed = 0
+                continue
         free, posture = levels, -1
         if careful:  # all levels below the first one that is off only hold what they have
-            total_errors(m, w, index, values, band, totals)
             free = first_off(totals, levels)
         drifts = met if settings.posture_after else iterations < settings.drift
         if drifts and free == levels and settings.posture_step > 0.0:
@@ -221,9 +219,6 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         if settings.limits:
             hold_limits(m, balls, state)
         iterations += 1
-    if not current:
-        copy_state(best, state, size)
-        evaluate(m, w, index, values, goals, state, settings)
     locals_of_hinges(m, state)
     return iterations
 

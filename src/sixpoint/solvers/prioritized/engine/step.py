@@ -33,21 +33,8 @@ def mask(m, w, i):
 
 
 @helper
-def take_level(m, w, index, values, level, goals, state, settings, free, step, work, basis, size):
-    """Solve one level inside the null space of those above; returns the new size of the basis.
-
-    FLEXT rows of the secant form go first: they move the limb, and the rows of its three directions occupy.
-    """
-    solve_rows(m, w, index, values, level, goals, state, settings, free, step, work, basis, size, True)
-    rank = solve_rows(
-        m, w, index, values, level, goals, state, settings, free, step, work, basis, size, False
-    )
-    return size + rank
-
-
-@helper
 def solve_rows(m, w, index, values, level, goals, state, settings, free, step, work, basis, size, leading):
-    """Solve the rows of a level that lead, or the others; returns their rank."""
+    """Solve the rows of a level that lead, or the others, in what the basis leaves; returns their rank."""
     first, count = int(m.levels[level, 0]), int(m.levels[level, 1])
     used, longest = 0, 0.0
     capacity = w.small.shape[1]
@@ -96,7 +83,12 @@ def prioritized_step(m, w, index, values, goals, state, settings, free, fixed, s
     linear.copy(w.rows, step, fixed)
     size = 0
     for level in range(len(m.levels)):
-        size = take_level(m, w, index, values, level, goals, state, settings, free, step, work, basis, size)
+        # FLEXT rows of the secant form go first: they move the limb, the rows of its directions occupy.
+        for leading in (True, False):
+            rank = solve_rows(
+                m, w, index, values, level, goals, state, settings, free, step, work, basis, size, leading
+            )
+            size += 0 if leading else rank
     if posture >= 0:
         linear.copy(w.rows, work, posture)
         mask(m, w, work)
