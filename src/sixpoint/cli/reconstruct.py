@@ -33,7 +33,7 @@ def reconstruct(
         float | None, Parameter(help="For six points: stature of the built-in figure [m]; 1.75 by default.")
     ] = None,
     frames: Frames = None,
-    method: Annotated[str, Parameter(help="How to solve.")] = "sik",
+    method: Annotated[str, Parameter(help="How to solve: sik, pik or pik-flext.")] = "sik",
     weights: Annotated[
         str | None,
         Parameter(
