@@ -137,7 +137,9 @@ class Hinges:
         quat = np.asarray(rotations, float)
         if self.size == 1:
             angle = 2.0 * np.arctan2(quat[..., :3] @ self.axes[0], quat[..., 3])
-            return np.asarray((angle[..., None] + np.pi) % (2 * np.pi) - np.pi)
+            middle = 0.5 * (self.lower[0] + self.upper[0])
+            middle = middle if np.isfinite(middle) else 0.0  # the turn that is nearest to the range
+            return np.asarray(middle + (angle[..., None] - middle + np.pi) % (2 * np.pi) - np.pi)
         axes = np.array(self.axes)  # SciPy wants a writable array
         if self.size == 2:
             axes = np.vstack([axes, np.cross(axes[0], axes[1])])

@@ -20,7 +20,6 @@ from sixpoint.body.skeleton import Skeleton
 from sixpoint.errors import SixpointError, listed
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Place = tuple[int, Array]
 
 
@@ -116,6 +115,17 @@ class Articulation:
                 state[joints + 1 + joint, : dof.size] = np.clip(0.0, dof.lower, dof.upper)
         return state
 
+    def moving_rows(self) -> NDArray[np.bool_]:
+        """(2 J + 1, 4) which numbers of a state belong to something that moves."""
+        joints = len(self.tree)
+        moving = np.zeros((2 * joints + 1, 4), bool)
+        moving[joints] = True
+        for joint, dof in self.dofs.joints.items():
+            moving[joint] = dof.size > 0
+            if isinstance(dof, Hinges):
+                moving[joints + 1 + joint, : dof.size] = True
+        return moving
+
     def states_of(self, rotations: Array, positions: Array) -> Array:
         """States (F, 2 J + 1, 4) of rig rotations (F, J, 4) and base positions (F, 3) [m]."""
         frames, joints = len(rotations), len(self.tree)
@@ -123,29 +133,17 @@ class Articulation:
         states = np.zeros((frames, 2 * joints + 1, 4))
         states[:, :joints] = rot.IDENTITY
         states[:, joints, :3] = positions
-        balls, (single, axes), others = self._kinds
-        states[:, balls] = local[:, balls]
-        turned = local[:, single]
-        angles = 2.0 * np.arctan2(np.sum(turned[..., :3] * axes, axis=-1), turned[..., 3])
-        states[:, joints + 1 + single, 0] = (angles + np.pi) % (2 * np.pi) - np.pi
-        for joint, dof in others:
-            states[:, joints + 1 + joint, : dof.size] = dof.compute_angles(local[:, joint])
+        for joint, dof in self.dofs.joints.items():
+            if isinstance(dof, Ball):
+                states[:, joint] = local[:, joint]
+            elif isinstance(dof, Hinges):
+                states[:, joints + 1 + joint, : dof.size] = dof.compute_angles(local[:, joint])
         return states
 
     @cached_property
     def _unwinding(self) -> tuple[Array, Array]:
         """What takes a rig's local rotation back to the tree's: inverses of ``before`` and ``neutral``."""
         return rot.inv(self.before), rot.inv(self.neutral)
-
-    @cached_property
-    def _kinds(self) -> tuple[list[int], tuple[Index, Array], list[tuple[int, Hinges]]]:
-        """Ball joints, single hinges with their axes, and sequences of hinges."""
-        balls = [j for j, dof in self.dofs.joints.items() if isinstance(dof, Ball)]
-        hinges = [(j, dof) for j, dof in self.dofs.joints.items() if isinstance(dof, Hinges)]
-        single = [(j, dof.axes[0]) for j, dof in hinges if dof.size == 1]
-        axes = np.array([axis for _, axis in single]).reshape(-1, 3)
-        joints = np.array([j for j, _ in single], np.int64)
-        return balls, (joints, axes), [(j, dof) for j, dof in hinges if dof.size > 1]
 
     def state_of(self, pose: Pose) -> Array:
         """State of a pose of the rig."""

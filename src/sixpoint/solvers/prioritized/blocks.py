@@ -37,7 +37,10 @@ Array = NDArray[np.float64]
 METRES, RADIANS = 1e-3, 1e-2
 """Errors at which iterating stops, by default."""
 ACCEPTED = 10.0
-"""A frame counts as met within so many times that: 1 cm, as in Unzueta et al. 2008, section 9."""
+"""A frame counts as met within so many times that: 1 cm, as in Unzueta et al. 2008, section 9.
+
+A larger tolerance counts as it is.
+"""
 ROTATION_STEP = 0.3
 CHAIN_SHARE = 0.1
 """Largest wanted change of one iteration: 10 % of the driving chain (Boulic and Raunhardt 2009), 0.3 rad."""
@@ -62,8 +65,9 @@ def _block(
     angular = kind in (packing.ORIENTATION, packing.LOOK_AT, packing.ALIGNMENT, packing.COUPLING)
     usual = RADIANS if angular else METRES
     tolerance = task.tolerance or usual
+    accepted = min(ACCEPTED * tolerance, max(ACCEPTED * usual, tolerance))
     values[packing.WEIGHT], values[packing.STEP] = task.weight, step
-    values[packing.TOLERANCE], values[packing.ACCEPT] = tolerance, max(ACCEPTED * usual, tolerance)
+    values[packing.TOLERANCE], values[packing.ACCEPT] = tolerance, accepted
     for name, value in extra.items():
         column = getattr(packing, name.upper())
         if name in ("root", "middle", "shape", "option"):
@@ -96,18 +100,18 @@ def _reach(body: Articulation, joint: int, offset: Array) -> float:
     path = body.tree.path(0, joint)
     below = [j for j in path[1:] if j > body.base]
     length = float(np.linalg.norm(body.tree.offsets[below], axis=1).sum() + np.linalg.norm(offset))
-    return CHAIN_SHARE * max(length, 0.5 if body.dofs.free_root else 1e-3)
+    return CHAIN_SHARE * max(length, 1.0 if body.dofs.free_root else 1e-3)
 
 
-def lower_task(body: Articulation, task: Task, k: int) -> list[Block]:
-    """Blocks of one task; ``k`` is its row among the goals.
+def lower_task(body: Articulation, task: Task, k: int, limits: bool) -> list[Block]:
+    """Blocks of one task; ``k`` is its row among the goals, ``limits`` whether hinges have any.
 
     Raises:
         SixpointError: It hangs on a joint that does not exist, or its numbers make no sense.
     """
     match task:
         case FlextTask():
-            return _flext(body, task, k)
+            return _flext(body, task, k, limits)
         case PositionTask():
             joint, offset = _point(body, task.at, task.offset)
             step = _reach(body, joint, offset)
@@ -220,9 +224,10 @@ def _coupling(body: Articulation, task: CouplingTask, k: int) -> Block:
     )
 
 
-def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
+def _flext(body: Articulation, task: FlextTask, k: int, limits: bool) -> list[Block]:
     joint, offset = _point(body, task.at, task.offset)
-    limb = find_limb(body, task, joint, offset)
+    limb = find_limb(body, task, joint, offset, limits)
+    drag = limb.movable if task.drag is None else task.drag
     forms = {
         "tangent": 0,
         "exponential": packing.EXPONENTIAL,
@@ -231,22 +236,29 @@ def _flext(body: Articulation, task: FlextTask, k: int) -> list[Block]:
     }
     if task.form not in forms:
         raise SixpointError(f"{task.label}: the form is one of {', '.join(forms)}; got {task.form!r}")
-    common = {
+    common: dict[str, Any] = {
         "offset": offset,
         "root": limb.root,
         "middle": limb.middle,
-        "option": forms[task.form] | task.predict * packing.PREDICT | task.drag * packing.FOLLOW,
+        "option": forms[task.form] | task.predict * packing.PREDICT,
         "side": limb.side,
         "low": limb.low,
         "high": limb.high,
     }
     step = CHAIN_SHARE * limb.length
-    across = task.level + 1 if task.tangential_level is None else task.tangential_level
+    secant = task.form == "secant"
+    across = task.tangential_level
+    if across is None:
+        across = task.level if secant else task.level + 1
     blocks = [
         _block(packing.FLEXT, task, k, 1, joint, task.level, step, **common),
         _block(packing.TANGENTIAL, task, k, 2, joint, across, step, **common),
     ]
-    if task.drag or task.form == "secant":
+    if drag:
         level = task.level + 2 if task.drag_level is None else task.drag_level
-        blocks.append(_block(packing.DRAG, task, k, 1, joint, level, step, **common))
+        follow = {**common, "option": common["option"] | packing.FOLLOW}
+        blocks.append(_block(packing.DRAG, task, k, 1, joint, level, step, **follow))
+    if secant:  # what the limb can reach is held along it too, unless the body is to follow
+        common["option"] |= packing.YIELD if drag else 0
+        blocks.append(_block(packing.DRAG, task, k, 1, joint, task.level, step, **common))
     return blocks

@@ -20,7 +20,10 @@ SHORT = 1e-3  # a segment below this has no length [m]
 
 @dataclass(frozen=True)
 class Limb:
-    """A limb: indices of its joints, its length [m], which way it folds, and its hinge's range [rad]."""
+    """A limb: its joints, its length [m], which way it folds, its hinge's range [rad].
+
+    ``movable`` tells whether anything above its root can move.
+    """
 
     root: int
     middle: int
@@ -28,9 +31,10 @@ class Limb:
     side: float
     low: float
     high: float
+    movable: bool
 
 
-def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) -> Limb:
+def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array, limits: bool) -> Limb:
     """Find the limb whose end is a point of a joint; lengths are those of the neutral pose.
 
     Raises:
@@ -68,7 +72,11 @@ def find_limb(body: Articulation, task: FlextTask, joint: int, offset: Array) ->
     dof = body.dofs[middle]
     assert isinstance(dof, Hinges)
     low, high = max(float(dof.lower[0]), -np.pi), min(float(dof.upper[0]), np.pi)
-    return Limb(root, middle, float(sum(lengths)), -1.0 if -low > high else 1.0, low, high)
+    side = -1.0 if -low > high else 1.0
+    if not limits:
+        low, high = -np.pi, np.pi
+    movable = body.dofs.free_root or any(body.dofs[j].size for j in path[: path.index(root)])
+    return Limb(root, middle, float(sum(lengths)), side, low, high, bool(movable))
 
 
 def _role_middle(body: Articulation, path: list[int]) -> int | None:

@@ -35,7 +35,6 @@ class Lowered:
         values: (B, 18) numbers of the blocks.
         rows: Rows of all blocks.
         widest: Rows of the widest level.
-        most_points: Support points.
     """
 
     model: Model
@@ -46,9 +45,11 @@ class Lowered:
     widest: int
 
 
-def lower(body: Articulation, tasks: Sequence[Task], posture: PostureTask | None) -> Lowered:
+def lower(
+    body: Articulation, tasks: Sequence[Task], posture: PostureTask | None, limits: bool = True
+) -> Lowered:
     """Lower a body and its tasks; posture is not among them."""
-    blocks = [block for k, task in enumerate(tasks) for block in lower_task(body, task, k)]
+    blocks = [block for k, task in enumerate(tasks) for block in lower_task(body, task, k, limits)]
     wanted = sorted({block.level for block in blocks})
     blocks.sort(key=lambda block: block.level)
     index = np.zeros((len(blocks), packing.BLOCK_INTEGERS), np.int64)

@@ -108,9 +108,10 @@ class PrioritizedIK:
         )
         most = max(iterations, cold_iterations)
         self._cold_settings = pack_settings(self._settings._replace(most=most, drift=most // 2))
-        self._engine = Engine(lower(self.body, self.tasks, self.posture), len(self.tasks))
+        self._engine = Engine(lower(self.body, self.tasks, self.posture, limits), len(self.tasks))
         self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
+        self._moving = self.body.moving_rows()
         self._attractor = attractor_state(self.body, self.posture)
         self._adapted: dict[float, Array] = {}
         self._starter: SequentialIK | None = None
@@ -330,7 +331,7 @@ class PrioritizedIK:
             return self._start.copy()
         if previous.pose.skeleton is not self.body.rig or previous.state[0].shape != self._start.shape:
             raise SixpointError("previous is of another body or method; begin with previous=None")
-        return previous.state[0].copy()
+        return np.where(self._moving, previous.state[0], self._start)  # what is fixed here stays so
 
     def _gave_way(self, shares: Array) -> dict[str, tuple[str, ...]]:
         """Unmet task -> what holds the motion it needs."""

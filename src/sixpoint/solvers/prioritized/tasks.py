@@ -31,7 +31,7 @@ class Task:
         at: Where the task is attached: a role, a joint or a site.
         level: Priority, 0 is the most important; gaps do not matter.
         offset: (3,) point in the joint's frame [m]; in a figure, its anatomical frame.
-        weight: Influence within its level.
+        weight: Influence within its level (not of FLEXT's own row, which has unit norm).
         goal: Goal of the frames that give none.
         name: What goals and residuals are called by; by default the place, with the kind of task.
         tolerance: Error at which iterating stops [m or rad]; None for 1 mm or 0.01 rad.
@@ -210,8 +210,10 @@ class FlextTask(Task):
     Reference: Boulic and Raunhardt 2009.
 
     Attributes:
-        tangential_level: Level of the two other directions; by default the next one.
-        drag: Let the rest of the body follow when the goal is beyond the limb.
+        tangential_level: Level of the two other directions; by default the next one, in the secant form the
+            same.
+        drag: Let the rest of the body follow when the goal is beyond the limb; by default wherever something
+            above the limb's root can move.
         drag_level: Level of that; by default two below ``level``.
         form: "tangent": the row in the tangent space; "exponential": from exponential-map parameters, as in
             the paper; "secant": lower levels may move the limb's root, and the hinge answers at once (good
@@ -223,7 +225,7 @@ class FlextTask(Task):
 
     _: KW_ONLY
     tangential_level: int | None = None
-    drag: bool = False
+    drag: bool | None = None
     drag_level: int | None = None
     form: Literal["tangent", "exponential", "hinge", "secant"] = "tangent"
     predict: bool = True

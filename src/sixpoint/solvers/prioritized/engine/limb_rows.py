@@ -142,8 +142,12 @@ def build_tangential(m, w, index, values, b, point, goal, gain):
 
 @helper
 def build_drag(m, w, index, values, b, goal, state, gain):
-    """The row along the limb: what of the goal is out of its reach; in the secant form also what it holds."""
-    r, joint = index[b, FIRST], index[b, JOINT]
+    """The row along the limb.
+
+    With FOLLOW it asks for what of the goal is out of the limb's reach. Without, in the secant form, it holds
+    what the limb has been given; with YIELD only where the goal is within reach.
+    """
+    r, joint, option = index[b, FIRST], index[b, JOINT], index[b, packing.OPTION]
     weight, step = values[b, packing.WEIGHT], values[b, packing.STEP]
     root, middle, end, axis, angle = limb_of(m, w, index, values, b, state)
     low, high = values[b, packing.LOW], values[b, packing.HIGH]
@@ -152,18 +156,17 @@ def build_drag(m, w, index, values, b, goal, state, gain):
     )
     side = values[b, packing.SIDE]
     _, _, _, beyond = flext.solve_triangle(l1, l2, l3, sigma, alpha, wish, side, low, high)
+    out = abs(beyond) > 1e-6
     u = vec.unit(vec.sub(end, root))
-    secant = index[b, packing.OPTION] & packing.SECANT > 0
-    if vec.dot(u, u) < 0.5 or (abs(beyond) < 1e-6 and not secant):
+    if vec.dot(u, u) < 0.5 or (option & packing.FOLLOW and not out) or (option & packing.YIELD and out):
         w.block[b, 2] = OFF
         return
-    # The body follows only as far as the limb points to the goal already.
-    beyond *= max(vec.dot(u, vec.unit(vec.sub(goal, root))), 0.0)
-    w.row[r, 0] = weight * beyond * limited(abs(beyond), gain, step)
+    w.row[r, 0] = 0.0
     add_row(m, w, r, joint, end, vec.scale(weight, u), NONE)
-    if secant:
-        if index[b, packing.OPTION] & packing.FOLLOW == 0:
-            w.row[r, 0] = 0.0
+    if option & packing.FOLLOW:  # the body follows only as far as the limb points to the goal already
+        beyond *= max(vec.dot(u, vec.unit(vec.sub(goal, root))), 0.0)
+        w.row[r, 0] = weight * beyond * limited(abs(beyond), gain, step)
+    if option & packing.SECANT:
         wish = wish * limited(abs(wish), gain, step)
         slope = flext.secant(l1, l2, l3, sigma, alpha, wish, side, low, high)
         w.rows[r, m.start[index[b, MIDDLE]]] = weight * slope
