@@ -209,7 +209,14 @@ def test_flext_rows_across_and_along_the_limb(make, at, root, middle, seed):
     along = unit(place - positions[m.body.joint(root)])
     goal = place + 2.0 * along + 0.003 * m.rng.normal(size=3)
     task = sp.FlextTask(
-        at, offset=tuple(m.offset), weight=1.7, drag=True, root=root, middle=middle, predict=False
+        at,
+        offset=tuple(m.offset),
+        weight=1.7,
+        drag=True,
+        root=root,
+        middle=middle,
+        predict=False,
+        form="tangent",
     )
     step = rows_of(m.body, m.state, task, goal)
     rate = m.body.differences(m.state, m.where)

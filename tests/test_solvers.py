@@ -19,11 +19,11 @@ MET = {"sik": 1e-9, "pik": 1.1e-3, "pik-flext": 1.1e-3}
 """Distance [m] at which a method counts a point as met: prioritized IK stops iterating at 1 mm."""
 REST = {"sik": 1e-12, "pik": 5e-3, "pik-flext": 5e-3}
 """1 - cos(half angle) that the neutral pose may be off: prioritized IK relaxes elbows and knees."""
-STRETCHED = {"sik": 1e-6, "pik": 2e-2, "pik-flext": 2e-2}
+STRETCHED = {"sik": 1e-6, "pik": 4e-2, "pik-flext": 4e-2}
 """How far the unit vector along a stretched limb may be off."""
 SETTLED = {"sik": 1, "pik": 60, "pik-flext": 60}
 """Frames after which a method stands still before a world that no pose can meet."""
-SCALED = {"sik": 1e-5, "pik": 0.02, "pik-flext": 0.1}
+SCALED = {"sik": 1e-5, "pik": 0.02, "pik-flext": 0.2}
 """Angle [rad] by which the pose of a scaled body may differ: thresholds are in metres."""
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 SWAPPED = [0, 1, 3, 2, 5, 4]
@@ -119,7 +119,9 @@ def test_unreachable_points_stretch_the_limb(name):
     points = points_of(FIGURE)
     points[2] += [2.0, 0.5, 1.0]
     points[5] += [-1.0, -2.0, 0.5]
-    solution = sp.make_solver(name, FIGURE, limits=False).solve(points)
+    solver, solution = sp.make_solver(name, FIGURE, limits=False), None
+    for _ in range(SETTLED[name]):
+        solution = solver.solve(points, previous=solution)
     assert solution.status is sp.Status.UNREACHABLE
     positions = as_motion(FIGURE, solution).positions[0]
     for effector, limb in ((2, 0), (5, 3)):

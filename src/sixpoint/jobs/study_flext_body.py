@@ -189,7 +189,7 @@ def reach(figure: Figure, name: str, budget: int, held: bool = True) -> BodyRun:
 def _place(at: str, level: int, method: str) -> Task:
     """A position constraint, plain, FLEXT or its secant form."""
     if method == "FLEXT":
-        return FlextTask(at, level=level, drag=True, tolerance=FINE)
+        return FlextTask(at, level=level, drag=True, tolerance=FINE, form="tangent")
     if method == "secant":
         return FlextTask(at, level=level, drag=True, tolerance=FINE, form="secant")
     return PositionTask(at, level=level, tolerance=FINE)

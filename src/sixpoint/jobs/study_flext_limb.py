@@ -83,7 +83,8 @@ def flex(figure: Figure, goal: str, method: str, bend: float, turned: bool = Fal
     roles, place = figure.roles, goal_of(figure, goal)
     every = figure.full_dofs() if turned else figure.dofs
     joints = [roles.shoulder[0], roles.elbow[0], *([roles.wrist[0]] if turned else [])]
-    tasks: list[Task] = [(FlextTask if method == "FLEXT" else PositionTask)("l_wrist", goal=place)]
+    flexing = FlextTask("l_wrist", goal=place, form="tangent")
+    tasks: list[Task] = [flexing if method == "FLEXT" else PositionTask("l_wrist", goal=place)]
     if turned:
         tasks.append(OrientationTask("l_wrist", level=2, goal=FORWARD))
     dofs = Dofs({joint: every[joint] for joint in joints}, free_root=False)

@@ -43,7 +43,8 @@ class Solution:
             IK the error of every task [m or rad].
         iterations: Frame updates used; 1 for a sequential method.
         state: What the next frame needs; give the whole solution as ``previous``.
-        gave_way: Of prioritized IK: unmet task -> tasks (or "joint limits") that hold the motion it needs.
+        gave_way: Of prioritized IK: unmet task -> tasks (or "joint limits") that hold the motion it needs;
+            nothing where it is out of reach, or the search ended there.
     """
 
     pose: Pose
@@ -54,7 +55,7 @@ class Solution:
     gave_way: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        return f"Solution({self.status.name}, worst residual {self.residual.max():.4f} m)"
+        return f"Solution({self.status.name}, worst residual {max(self.residual, default=0.0):.4f})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

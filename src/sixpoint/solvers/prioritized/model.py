@@ -161,7 +161,10 @@ def support_of(body: Articulation, task: BalanceTask) -> list[tuple[int, Array]]
 
 def _shifted(body: Articulation, name: str, offset: tuple[float, float, float]) -> tuple[int, Array]:
     joint, base = body.place(name)
-    return joint, base + np.asarray(offset, float)
+    shift = np.asarray(offset, float)
+    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
+        raise SixpointError(f"an offset is three finite numbers [m], got {offset} at {name!r}")
+    return joint, base + shift
 
 
 def posture_weights(body: Articulation, posture: PostureTask) -> Array:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.prioritized.engine.frame import solve_prioritized
 from sixpoint.solvers.prioritized.engine.packing import pack_model
 from sixpoint.solvers.prioritized.model import Lowered, scratch_sizes
 
 Array = NDArray[np.float64]
+
+log = logging.getLogger("sixpoint")
 
 
 class Frames(NamedTuple):
@@ -75,6 +79,8 @@ class Engine:
             np.empty(frames, np.int64),
             np.zeros((frames if explain else 0, self._tasks, self._tasks + 1)),
         )
+        if not solve_prioritized.signatures and not is_cached("solve_prioritized"):
+            log.warning("compiling the prioritized engine, once (about half a minute)")
         scratch = scratch or self.make_scratch()
         arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
         solve_prioritized(*arguments)

@@ -7,7 +7,6 @@ inverse kinematics for precise full body interactions", MIG 2009.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -21,8 +20,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
-from sixpoint.errors import SixpointError
-from sixpoint.kernels.jit import is_cached
+from sixpoint.errors import SixpointError, TargetError
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.engine.packing import Settings, pack_settings
@@ -43,8 +41,6 @@ POSTURE_SPEED = 6.0  # the same from frame to frame [rad/s]
 TRACE = 0.05  # less than this holds nothing
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
-log = logging.getLogger("sixpoint")
-
 
 class PrioritizedIK:
     """Prioritized Inverse Kinematics with the FLEXT constraint.
@@ -56,7 +52,7 @@ class PrioritizedIK:
         limits: Keep every joint within its limits.
         gain: Share of the error that one iteration asks for, in (0, 1].
         iterations: Most iterations of a frame that continues another.
-        cold_iterations: Most iterations of a frame without a previous one.
+        cold_iterations: Most iterations of a frame with neither a previous one nor a start.
         least_iterations: Fewest iterations of a frame.
         max_angle: Largest turn of a joint in one iteration [rad].
         max_shift: Largest translation of the base in one iteration [m].
@@ -84,8 +80,13 @@ class PrioritizedIK:
     ) -> None:
         if not 0 < gain <= 1:
             raise SixpointError(f"the gain is a number above 0, at most 1; got {gain}")
-        if not 0 <= least_iterations <= iterations:
-            raise SixpointError("iterations are whole numbers, at least least_iterations >= 0")
+        counts = (least_iterations, iterations, cold_iterations)
+        if any(int(k) != k for k in counts if np.isfinite(k)) or not np.all(np.isfinite(counts)):
+            raise SixpointError(f"iterations are whole numbers, got {counts}")
+        if not 0 <= least_iterations <= min(iterations, cold_iterations):
+            raise SixpointError(
+                "iterations and cold_iterations are at least least_iterations, that at least 0"
+            )
         for option, value in (("max_angle", max_angle), ("max_shift", max_shift)):
             if not 0 < value < np.inf:
                 raise SixpointError(f"{option} is a positive number, got {value}")
@@ -106,7 +107,7 @@ class PrioritizedIK:
             least=least_iterations,
             drift=1,
         )
-        most = max(iterations, cold_iterations)
+        most = cold_iterations
         self._cold_settings = pack_settings(self._settings._replace(most=most, drift=most // 2))
         self._engine = Engine(lower(self.body, self.tasks, self.posture, limits), len(self.tasks))
         self._goals = GoalTable(self.tasks)
@@ -145,6 +146,7 @@ class PrioritizedIK:
         if len(solver.goal_names) != len(EFFECTORS):
             raise SixpointError(f"the six points need six tasks with a goal, got {len(solver.goal_names)}")
         solver._starter = SequentialIK(figure, limits=limits)
+        solver._goals.infinite_is_unknown = True
         solver._restart = start == "sequential"
         return solver
 
@@ -205,7 +207,7 @@ class PrioritizedIK:
         frame = self.compute_goals(goals)
         begun: tuple[Array, ...] = ()
         if start is None and self._starter is not None and (previous is None or self._restart):
-            first = self._starter.solve(frame[:, :3], self._started(previous), dt)
+            first = self._starter.solve(frame[self._goals.rows, :3], self._started(previous), dt)
             start, begun = first.pose, first.state if self._restart else ()
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
         if previous is None and start is None:
@@ -239,6 +241,8 @@ class PrioritizedIK:
         state = self.body.state_of(start) if start is not None else self._state_after(previous)
         settings = pack_settings(self._settings._replace(most=-1, least=1))
         scratch = self._engine.make_scratch()
+        for array in scratch:
+            array.fill(0)
         goal = self.compute_goals(goals)
         out = self._engine.run(
             goal[None], np.empty((0, *state.shape)), state, self._attractor, settings, scratch
@@ -257,6 +261,12 @@ class PrioritizedIK:
             positions, rate, name = targets.positions, targets.rate, targets.name
         else:
             positions, rate, name = np.asarray(targets, float), 60.0, "prioritized"
+            if self._starter is not None and positions.ndim == 3 and positions.shape[1:] == (6, 3):
+                return self.solve_frames(Targets(positions, rate, name=name), progress)
+            if positions.ndim != 3 or len(positions) == 0:
+                raise TargetError(
+                    f"goals of frames are an array (frames, tasks, 3 or 7), got {positions.shape}"
+                )
         goals = self._goals.compute_frames(positions)
         starts = np.empty((0, *self._start.shape))
         if self._starter is not None and isinstance(targets, Targets):
@@ -291,8 +301,6 @@ class PrioritizedIK:
 
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the rest pose."""
-        if not is_cached("solve_prioritized"):
-            log.warning("compiling kernels, once (about half a minute)")
         state = self._start.copy()
         empty = np.empty((0, *state.shape))
         self._engine.run(self._goals.default[None], empty, state, self._attractor, self._settings_at(FRAME))
@@ -337,8 +345,9 @@ class PrioritizedIK:
         """Unmet task -> what holds the motion it needs."""
         names = (*self.names, "joint limits")
         found = {}
-        for name, row in zip(names, shares, strict=False):
-            if row.any():  # most important cause first; at least the largest, if anything holds it at all
+        for k, (name, row) in enumerate(zip(names, shares, strict=False)):
+            if row[k] > 0.0:  # unmet; the most important cause first, at least the largest if there is any
+                row[k] = 0.0
                 order = np.argsort(-row, kind="stable")
                 held = [k for k in order if row[k] > SHARE] or [k for k in order[:1] if row[k] > TRACE]
                 found[name] = tuple(names[k] for k in held)

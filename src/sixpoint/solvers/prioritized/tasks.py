@@ -5,8 +5,8 @@ joint or a site of the rig by name; ``offset`` shifts it to a point fixed to tha
 goal and whether the task is active are not part of it: they are given frame by frame. ``goal`` is the value
 for frames that give none.
 
-A goal is a frame: a position (3,) [m], a rotation (4,) xyzw, or both (7,). A task without a goal is off; NaN
-says that the goal is unknown, which is off too, and the frame is LOST.
+A goal is a frame: a position (3,) [m], a rotation (4,) xyzw, or both (7,). A task without a goal, or with
+None or infinity, is off; NaN says that the goal is unknown, which is off too, and the frame is LOST.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ class Task:
 
     suffix: ClassVar[str] = ""
     takes_goal: ClassVar[bool] = True
+    turns: ClassVar[bool] = False  # whether the goal is a rotation
 
     at: str
     _: KW_ONLY
@@ -65,6 +66,7 @@ class OrientationTask(Task):
     """A joint takes a world rotation, the goal's (4,); in a figure, that of its anatomical frame."""
 
     suffix: ClassVar[str] = "orientation"
+    turns: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,9 +217,10 @@ class FlextTask(Task):
         drag: Let the rest of the body follow when the goal is beyond the limb; by default wherever something
             above the limb's root can move.
         drag_level: Level of that; by default two below ``level``.
-        form: "tangent": the row in the tangent space; "exponential": from exponential-map parameters, as in
-            the paper; "secant": lower levels may move the limb's root, and the hinge answers at once (good
-            for feet that stand while the body moves); "hinge": the middle joint alone carries the row.
+        form: "tangent": the paper's row, in the tangent space; "exponential": the same from exponential-map
+            parameters, as printed; "secant": the row moves the limb, but what is kept from lower levels are
+            the three directions of its end, so that they may move the limb's root and the hinge answers at
+            once; "hinge": the middle joint alone carries the row.
         predict: Allow for what higher levels do to root and end in the same step.
         root: Root of the limb, by default the next moving joint above the middle one.
         middle: Middle joint; by default the nearest hinge above.
@@ -227,7 +230,7 @@ class FlextTask(Task):
     tangential_level: int | None = None
     drag: bool | None = None
     drag_level: int | None = None
-    form: Literal["tangent", "exponential", "hinge", "secant"] = "tangent"
+    form: Literal["tangent", "exponential", "hinge", "secant"] = "secant"
     predict: bool = True
     root: str | None = None
     middle: str | None = None

@@ -15,6 +15,7 @@ from sixpoint.kernels.jit import helper
 
 NULL = 1e-7  # a wanted change of length below this is none [m]
 VIRTUAL = 1e-3  # the virtual displacement, over the length of the limb
+STRAIGHT = 1e-6  # a bend below this has no side of its own [rad]
 SECANT = 0.02  # the least change of length that a secant is taken over, over the length of the limb
 MARGIN = 1e-6  # the limits 12 and 13 are strict
 
@@ -89,7 +90,7 @@ def solve_triangle(l1, l2, l3, sigma, alpha, wanted, standard, low, high):
     """
     if l1 < 1e-6 or l2 < 1e-6:
         return 0.0, 0.0, -1.0, 0.0
-    side = standard if sigma == 0.0 else (1.0 if sigma > 0.0 else -1.0)
+    side = standard if abs(sigma) < STRAIGHT else (1.0 if sigma > 0.0 else -1.0)
     shortest, longest = branch_range(l1, l2, side, low, high)
     if side != standard and (shortest > longest or l3 + wanted < shortest):
         # Overextended, and the hinge cannot fold this way: come back over the straight limb.

@@ -20,8 +20,10 @@ from sixpoint.solvers.prioritized.engine.yielding import report_yielding
 
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 GAIN = 3e-5  # less than this is no gain [m]: 0.1 mm in three iterations
+AFTERWARDS = 5  # iterations for a posture that waits until all is met
 QUIET = 0.15  # share of the speed of the posture while a goal is unknown: what it let go sinks slowly
 FREE, PATIENCE = 6, 2  # steps without gain before going back: on the way, and when all are held
+CLOSING = 4  # iterations at the end in which levels below one that is off wait
 ENOUGH = 9  # iterations of which the last third is for holding levels
 SHORTEST = 0.02  # share of a step below which there is no more to gain
 
@@ -66,35 +68,59 @@ def all_within(w, index, values, column):
 
 
 @helper
-def count_off(w, index):
-    """Number of blocks without a goal, and with one; drags come and go by themselves."""
+def is_switched_off(goals, t):
+    """Whether a task is off on purpose, which infinity stands for."""
+    for k in range(7):
+        if abs(goals[t, k]) > 1e300:
+            return True
+    return False
+
+
+@helper
+def count_off(w, index, goals):
+    """Number of blocks whose goal is unknown, and of those that act; drags come and go by themselves."""
     off, on = 0, 0
     for b in range(len(index)):
         if w.block[b, 2] != OFF:
             on += 1
-        elif index[b, packing.KIND] != packing.DRAG:
+        elif index[b, packing.KIND] != packing.DRAG and not is_switched_off(goals, index[b, packing.TASK]):
             off += 1
     return off, on
 
 
 @helper
 def is_better(totals, best, levels, margin):
-    """Whether errors are smaller by more than a margin [m], the most important level first."""
+    """Whether errors are smaller by more than a margin [m], the most important level first.
+
+    Of a level that is far off a thousandth matters as little: it must not keep those below from their best.
+    """
     for level in range(levels):
-        if totals[level] < best[level] - margin:
+        enough = max(margin, 1e-3 * best[level])
+        if totals[level] < best[level] - enough:
             return True
-        if totals[level] > best[level] + margin:
+        if totals[level] > best[level] + enough:
             return False
     return False
 
 
 @helper
-def first_off(totals, levels):
-    """The most important level whose errors exceed their tolerances."""
-    for level in range(levels):
+def last_wishing(w, index, values, totals, levels):
+    """The last level that pursues its wishes while a level is off: that one, or where its tasks end.
+
+    A FLEXT task is off at the level of its flexion, and has rows below.
+    """
+    first = levels
+    for level in range(levels - 1, -1, -1):
         if totals[level] > 0.0:
-            return level
-    return levels
+            first = level
+    last = first
+    for b in range(len(index)):
+        if index[b, packing.LEVEL] != first or w.block[b, 0] <= values[b, packing.TOLERANCE]:
+            continue
+        for other in range(len(index)):
+            if index[other, packing.TASK] == index[b, packing.TASK]:
+                last = max(last, index[other, packing.LEVEL])
+    return last
 
 
 @helper
@@ -158,7 +184,7 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     First it runs freely until nothing has been gained for a while: a fold may have to open before it turns
     the right way, and a level may be off on the way by what still counts as met (1 cm). Then all levels are
     held to their tolerance (1 mm): steps without gain are taken back and the next are shorter, so that what
-    bends away from its tangent bends away less; then also all levels below one that is off wait.
+    bends away from its tangent bends away less. In the end all levels below one that is off wait.
     """
     size, levels, fixed = 2 * len(m.parent) + 1, len(m.levels), len(w.row)
     least, totals = best[size:, 0], best[size:, 1]
@@ -168,7 +194,7 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
     band, careful, returned, finished = packing.ACCEPT, False, False, False
     while True:
         evaluate(m, w, index, values, goals, state, settings)
-        off, on = count_off(w, index)
+        off, on = count_off(w, index, goals)
         if finished or (off > 0 and on == 0):  # nothing is known: stand still
             break
         met = all_within(w, index, values, packing.TOLERANCE)
@@ -185,18 +211,20 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
                     least[k] = totals[k]
             failed = 0 if gained else failed + 1
             share = min(2.0 * share, 1.0) if gained else share
-            finished = (met and iterations >= settings.least) or 0 <= settings.most <= iterations
+            enough = settings.least + (AFTERWARDS if settings.posture_after else 0)
+            finished = (met and iterations >= enough) or 0 <= settings.most <= iterations
             if band == packing.ACCEPT:
                 late = settings.most >= ENOUGH and 3 * iterations >= 2 * settings.most
                 returned = excess == 0.0 or failed >= FREE or late
                 band = packing.TOLERANCE if returned else band
-            elif failed >= PATIENCE:
-                returned = True
-                if share < 1.0 and not careful:
-                    careful, share = True, 1.0
-                else:
-                    share *= 0.3
-                finished = finished or (share < SHORTEST and iterations >= settings.least)
+            elif careful:
+                finished = finished or (failed > 0 and iterations >= settings.least)
+            else:
+                returned = failed >= PATIENCE
+                share *= 0.3 if returned else 1.0
+                closing = settings.most >= ENOUGH and iterations >= settings.most - CLOSING
+                if share < SHORTEST or closing:
+                    careful, returned, share = True, True, 1.0
             if finished and current:
                 break
             if finished or returned:
@@ -205,7 +233,7 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
                 continue
         free, posture = levels, -1
         if careful:  # all levels below the first one that is off only hold what they have
-            free = first_off(totals, levels)
+            free = last_wishing(w, index, values, totals, levels)
         drifts = met if settings.posture_after else iterations < settings.drift
         if drifts and free == levels and settings.posture_step > 0.0:
             posture = fixed + 2
@@ -221,15 +249,6 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
         iterations += 1
     locals_of_hinges(m, state)
     return iterations
-
-
-@helper
-def is_switched_off(goals, t):
-    """Whether a task is off on purpose, which infinity stands for."""
-    for k in range(7):
-        if abs(goals[t, k]) > 1e300:
-            return True
-    return False
 
 
 @helper
@@ -289,7 +308,7 @@ def solve_prioritized(
         iterations[f] = solve_frame(m, w, balls, index, values, goals[f], state, attractor, best, settings)
         status[f] = status_of(w, index, values, goals[f], residual[f])
         if f < len(yielded) and status[f] != CONVERGED:
-            report_yielding(m, w, index, values, goals[f], len(w.row), yielded[f])
+            report_yielding(m, w, index, values, goals[f], state, len(w.row), yielded[f])
         for j in range(joints):
             local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(state, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)

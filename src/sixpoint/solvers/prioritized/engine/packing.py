@@ -58,8 +58,11 @@ class Model(NamedTuple):
         kind: (J,) FIXED, BALL or HINGES.
         start: (J,) first column of each joint.
         size: (J,) columns of each joint.
+        points: (P, 4) support points in their joints' frames [m].
         ball: (J,) row of each joint in the table of swing and twist limits, -1 for none.
-        support: joints and points of the support polygon: see ``model.lower``.
+        point_joints: (P,) joint of each support point.
+        base: Joint whose position is the state's.
+        free: Whether it moves.
     """
 
     offsets: np.ndarray
@@ -80,7 +83,7 @@ class Model(NamedTuple):
     free: bool
 
 
-HEADER = 7  # joints, columns, levels, points, base, free, spare
+HEADER = 7  # joints, columns, levels, points, base, free, rows of all tasks
 
 
 def pack_model(model):
@@ -168,7 +171,7 @@ class Scratch(NamedTuple):
         row: (R, 4) wanted change of each row.
         block: (B, 4) error, signed distance and state of each block.
         lock: (2 J, 4) locked tangent directions of ball joints.
-        hull: (P, 4) the support polygon.
+        hull: (2 P, 4) the support polygon, and the points it is made of.
         rows: (M, n) long rows: the Jacobian's R, then the work rows below.
         small: corner for small matrices.
         locked: (n,) 1 for a locked column.

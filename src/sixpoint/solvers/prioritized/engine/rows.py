@@ -51,6 +51,9 @@ def known(goals, t, kind):
     for k in range(first, last):
         if not abs(goals[t, k]) < 1e7:
             return False
+    if last == 7:  # no rotation at all
+        square = goals[t, 3] ** 2 + goals[t, 4] ** 2 + goals[t, 5] ** 2 + goals[t, 6] ** 2
+        return square > 1e-12
     return True
 
 

@@ -5,8 +5,10 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.kinematics import add_row, place_of
-from sixpoint.solvers.prioritized.engine.step import mask
+from sixpoint.solvers.prioritized.engine.packing import HINGES
 from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, EQUAL, NONE, WAITING, X, Y, Z, triple
+
+AT_BOUND = 1e-4  # a hinge this near its bound is at it [rad]
 
 
 @helper
@@ -48,10 +50,31 @@ def _wanted(m, w, index, values, b, goals, wish):
 
 
 @helper
-def report_yielding(m, w, index, values, goals, fixed, yielded):
+def _held_by_limits(m, w, state, wish):
+    """Squared part of a wanted direction that leads out of limits: of hinges at a bound, of locked balls."""
+    joints, held = len(m.parent), 0.0
+    for j in range(joints):
+        start = m.start[j]
+        if m.kind[j] == HINGES:
+            for k in range(m.size[j]):
+                angle, way = state[joints + 1 + j, k], w.rows[wish, start + k]
+                if (angle < m.bounds[start + k, 0] + AT_BOUND and way < 0.0) or (
+                    angle > m.bounds[start + k, 1] - AT_BOUND and way > 0.0
+                ):
+                    held += way * way
+        for k in range(w.locks[j]):
+            u = vec.load(w.lock, 2 * j + k)
+            way = (w.rows[wish, start], w.rows[wish, start + 1], w.rows[wish, start + 2])
+            held += vec.dot(u, way) ** 2
+    return held
+
+
+@helper
+def report_yielding(m, w, index, values, goals, state, fixed, yielded):
     """Shares (T, T + 1): how much of what each unmet task needs is held by each other task; limits last.
 
-    A share is the squared part of the wanted direction that lies in the row space of the other task.
+    A share is the squared part of the wanted direction that lies in the row space of the other task; a task's
+    own share is 1 where it is unmet.
     """
     wish, work = fixed + 1, fixed + 3
     basis = work + w.small.shape[1]
@@ -60,13 +83,11 @@ def report_yielding(m, w, index, values, goals, fixed, yielded):
         active = w.block[b, 2] == EQUAL or w.block[b, 2] == ENFORCED
         if not active or w.block[b, 0] <= values[b, packing.ACCEPT]:
             continue
+        t = index[b, packing.TASK]
+        yielded[t, t] = 1.0
         if not _wanted(m, w, index, values, b, goals, wish):
             continue
-        t = index[b, packing.TASK]
-        linear.copy(w.rows, work, wish)
-        mask(m, w, work)
-        left = linear.dot(w.rows, work, work)
-        yielded[t, tasks] = max(yielded[t, tasks], 1.0 - left)
+        yielded[t, tasks] = max(yielded[t, tasks], _held_by_limits(m, w, state, wish))
         for other in range(len(index)):
             s = index[other, packing.TASK]
             held = w.block[other, 2] == EQUAL or w.block[other, 2] == ENFORCED
