@@ -79,7 +79,8 @@ class Engine:
             np.empty(frames, np.int64),
             np.zeros((frames if explain else 0, self._tasks, self._tasks + 1)),
         )
-        if not solve_prioritized.signatures and not is_cached("solve_prioritized"):
+        compiled = getattr(solve_prioritized, "signatures", True)
+        if not compiled and not is_cached("solve_prioritized"):
             log.warning("compiling the prioritized engine, once (about half a minute)")
         scratch = scratch or self.make_scratch()
         arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
