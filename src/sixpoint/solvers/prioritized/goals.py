@@ -84,6 +84,8 @@ class GoalTable:
     def _clean(self, goals: Array) -> Array:
         """What is no place becomes NaN, unknown; infinity stays, off, unless it stands for a lost point."""
         kept = np.abs(goals) < FAR
+        if kept.all():
+            return goals
         if not self.infinite_is_unknown:
             kept |= np.isinf(goals)
         return np.where(kept, goals, np.nan)

@@ -227,10 +227,13 @@ def solve_frame(m, w, balls, index, values, goals, state, attractor, best, setti
                     careful, returned, share = True, True, 1.0
             if finished and current:
                 break
-            if finished or returned:
+            failed = 0 if returned else failed
+            if finished or (returned and not current):
                 copy_state(best, state, size)
-                failed = 0
                 continue
+            if returned:  # the state is the best already
+                returned = False
+                total_errors(m, w, index, values, band, least)
         free, posture = levels, -1
         if careful:  # all levels below the first one that is off only hold what they have
             free = last_wishing(w, index, values, totals, levels)
