@@ -23,11 +23,12 @@ from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, TargetError
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.prioritized.articulation import Articulation
-from sixpoint.solvers.prioritized.engine.packing import Settings, pack_settings
+from sixpoint.solvers.prioritized.engine.packing import pack_settings
 from sixpoint.solvers.prioritized.full_body import attractor_state, default_tasks, place_base
 from sixpoint.solvers.prioritized.goals import Goals, GoalTable
 from sixpoint.solvers.prioritized.linear_step import LinearStep, read_step
 from sixpoint.solvers.prioritized.model import check_tasks, lower
+from sixpoint.solvers.prioritized.options import FRAME, at_frame_time, build_settings, cold
 from sixpoint.solvers.prioritized.running import Engine, Frames
 from sixpoint.solvers.prioritized.tasks import Task
 from sixpoint.solvers.sequential.solver import SequentialIK
@@ -35,9 +36,6 @@ from sixpoint.solvers.sequential.solver import SequentialIK
 Array = NDArray[np.float64]
 STATUSES = tuple(Status)
 CHUNK = 64  # frames between two reports of progress
-FRAME = 1 / 60  # the time in which the posture takes its step [s]
-POSTURE_STEP = 0.1  # largest turn of a joint towards the posture in one iteration [rad]
-POSTURE_SPEED = 6.0  # the same from frame to frame [rad/s]
 TRACE = 0.05  # less than this holds nothing
 SHARE = 0.3  # a task that holds this much of what another needs made it give way
 
@@ -78,37 +76,12 @@ class PrioritizedIK:
         max_shift: float = 0.1,
         rank_threshold: float = 1e-4,
     ) -> None:
-        if not 0 < gain <= 1:
-            raise SixpointError(f"the gain is a number above 0, at most 1; got {gain}")
-        counts = (least_iterations, iterations, cold_iterations)
-        if any(int(k) != k for k in counts if np.isfinite(k)) or not np.all(np.isfinite(counts)):
-            raise SixpointError(f"iterations are whole numbers, got {counts}")
-        if not 0 <= least_iterations <= min(iterations, cold_iterations):
-            raise SixpointError(
-                "iterations and cold_iterations are at least least_iterations, that at least 0"
-            )
-        for option, value in (("max_angle", max_angle), ("max_shift", max_shift)):
-            if not 0 < value < np.inf:
-                raise SixpointError(f"{option} is a positive number, got {value}")
-        if not 0 <= rank_threshold < 1:
-            raise SixpointError(f"rank_threshold is a share from 0, below 1; got {rank_threshold}")
         self.body = Articulation.of(body, dofs)
         self.tasks, self.posture = check_tasks(self.body, tasks)
-        self._settings = Settings(
-            limits=limits,
-            gain=gain,
-            max_angle=max_angle,
-            max_shift=max_shift,
-            rank=rank_threshold,
-            posture_step=0.0 if self.posture is None else self.posture.step,
-            posture_cap=POSTURE_STEP,
-            posture_after=self.posture is not None and self.posture.after,
-            most=iterations,
-            least=least_iterations,
-            drift=1,
+        self._settings = build_settings(
+            self.posture, limits, gain, max_angle, max_shift, rank_threshold, iterations, least_iterations
         )
-        most = cold_iterations
-        self._cold_settings = pack_settings(self._settings._replace(most=most, drift=most // 2))
+        self._cold_settings = pack_settings(cold(self._settings, cold_iterations))
         self._engine = Engine(lower(self.body, self.tasks, self.posture, limits), len(self.tasks))
         self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
@@ -326,12 +299,7 @@ class PrioritizedIK:
         if known is None:
             if len(self._adapted) > 100:
                 self._adapted.clear()
-            time = min(dt, 1e3) if dt > 0 else 0.0
-            drifting = self._settings._replace(
-                posture_step=1.0 - (1.0 - self._settings.posture_step) ** (time / FRAME),
-                posture_cap=min(POSTURE_SPEED * time, POSTURE_STEP),
-            )
-            known = self._adapted[dt] = pack_settings(drifting)
+            known = self._adapted[dt] = pack_settings(at_frame_time(self._settings, dt))
         return known
 
     def _state_after(self, previous: Solution | None) -> Array:
