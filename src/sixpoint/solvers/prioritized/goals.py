@@ -82,13 +82,8 @@ class GoalTable:
         raise self._wrong_shape(shape)
 
     def _clean(self, goals: Array) -> Array:
-        """What is no place becomes NaN, unknown; infinity stays, off, unless it stands for a lost point."""
-        kept = np.abs(goals) < FAR
-        if kept.all():
-            return goals
-        if not self.infinite_is_unknown:
-            kept |= np.isinf(goals)
-        return np.where(kept, goals, np.nan)
+        """Infinity is a task switched off, unless it stands for a lost point."""
+        return np.where(np.isinf(goals), np.nan, goals) if self.infinite_is_unknown else goals
 
     def _wrong_shape(self, got: object) -> TargetError:
         count = len(self.rows)

@@ -85,7 +85,8 @@ class PrioritizedIK:
         self._engine = Engine(lower(self.body, self.tasks, self.posture, limits), len(self.tasks))
         self._goals = GoalTable(self.tasks)
         self._start = self.body.rest_state()
-        self._moving = self.body.moving_rows()
+        self._fixed = ~self.body.moving_rows()
+        self._no_starts = np.empty((0, *self._start.shape))
         self._attractor = attractor_state(self.body, self.posture)
         self._adapted: dict[float, Array] = {}
         self._starter: SequentialIK | None = None
@@ -187,9 +188,7 @@ class PrioritizedIK:
             place_base(self.body, self.tasks, frame, state)
         settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
         attractor = self._attractor if posture is None else self.body.state_of(posture)
-        out = self._engine.run(
-            frame[None], np.empty((0, *state.shape)), state, attractor, settings, explain=True
-        )
+        out = self._engine.run(frame[None], self._no_starts, state, attractor, settings, explain=True)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)
         status = STATUSES[out.status[0]]
@@ -217,9 +216,7 @@ class PrioritizedIK:
         for array in scratch:
             array.fill(0)
         goal = self.compute_goals(goals)
-        out = self._engine.run(
-            goal[None], np.empty((0, *state.shape)), state, self._attractor, settings, scratch
-        )
+        out = self._engine.run(goal[None], self._no_starts, state, self._attractor, settings, scratch)
         return read_step(self._engine.lowered, scratch, int(out.iterations[0]))
 
     def solve_frames(self, targets: Targets | Array, progress: Progress | None = None) -> MotionSolution:
@@ -241,7 +238,7 @@ class PrioritizedIK:
                     f"goals of frames are an array (frames, tasks, 3 or 7), got {positions.shape}"
                 )
         goals = self._goals.compute_frames(positions)
-        starts = np.empty((0, *self._start.shape))
+        starts = self._no_starts
         if self._starter is not None and isinstance(targets, Targets):
             starts = self._sequential_starts(targets if self._restart else targets.sliced(slice(1)))
         state = self._start.copy()
@@ -275,8 +272,9 @@ class PrioritizedIK:
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the rest pose."""
         state = self._start.copy()
-        empty = np.empty((0, *state.shape))
-        self._engine.run(self._goals.default[None], empty, state, self._attractor, self._settings_at(FRAME))
+        self._engine.run(
+            self._goals.default[None], self._no_starts, state, self._attractor, self._settings_at(FRAME)
+        )
         if self._starter is not None:
             self._starter.warm_up()
 
@@ -307,7 +305,9 @@ class PrioritizedIK:
             return self._start.copy()
         if previous.pose.skeleton is not self.body.rig or previous.state[0].shape != self._start.shape:
             raise SixpointError("previous is of another body or method; begin with previous=None")
-        return np.where(self._moving, previous.state[0], self._start)  # what is fixed here stays so
+        state = previous.state[0].copy()
+        np.copyto(state, self._start, where=self._fixed)  # another solver of this body may move more joints
+        return state
 
     def _gave_way(self, shares: Array) -> dict[str, tuple[str, ...]]:
         """Unmet task -> what holds the motion it needs."""
