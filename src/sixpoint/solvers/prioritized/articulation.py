@@ -5,6 +5,7 @@ A plain skeleton is used as it is. Of a figure the anatomical tree is posed (``b
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -101,6 +102,22 @@ class Articulation:
             return joint, rot.mul_vec(self.neutral[joint], self.tree.site_offsets[site])
         sites = f"; sites: {listed(self.tree.site_names)}" if self.tree.site_names else ""
         raise SixpointError(f"no joint named {name!r}; joints: {listed(self.tree.names)}{sites}")
+
+    def point(self, name: str, offset: object = (0.0, 0.0, 0.0)) -> Place:
+        """A place shifted by an offset (3,) in its joint's frame [m].
+
+        Raises:
+            SixpointError: There is no such place, or the offset is not three finite numbers.
+        """
+        joint, base = self.place(name)
+        shift = np.asarray(offset, float)
+        if shift.shape != (3,) or not np.all(np.isfinite(shift)):
+            raise SixpointError(f"an offset is three finite numbers [m], got {offset} at {name!r}")
+        return joint, base + shift
+
+    def points(self, places: Iterable[str | tuple[str, object]]) -> list[Place]:
+        """Places, or (place, offset) pairs."""
+        return [self.point(p) if isinstance(p, str) else self.point(*p) for p in places]
 
     # --- states ----------------------------------------------------------------------------------
 

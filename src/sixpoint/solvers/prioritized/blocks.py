@@ -79,14 +79,6 @@ def _block(
     return Block(index, values, level)
 
 
-def _point(body: Articulation, name: str, offset: object) -> tuple[int, Array]:
-    joint, base = body.place(name)
-    shift = np.asarray(offset, float)
-    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
-        raise SixpointError(f"an offset is three finite numbers [m], got {offset} at {name!r}")
-    return joint, base + shift
-
-
 def _direction(task: Task, axis: object) -> Array:
     vector = np.asarray(axis, float)
     length = np.linalg.norm(vector)
@@ -113,19 +105,19 @@ def lower_task(body: Articulation, task: Task, k: int, limits: bool) -> list[Blo
         case FlextTask():
             return _flext(body, task, k, limits)
         case PositionTask():
-            joint, offset = _point(body, task.at, task.offset)
+            joint, offset = body.point(task.at, task.offset)
             step = _reach(body, joint, offset)
             return [_block(packing.POSITION, task, k, 3, joint, task.level, step, offset=offset)]
         case OrientationTask():
-            joint, _ = _point(body, task.at, task.offset)
+            joint, _ = body.point(task.at, task.offset)
             return [_block(packing.ORIENTATION, task, k, 3, joint, task.level, ROTATION_STEP)]
         case LookAtTask() | AlignTask():
             kind = packing.LOOK_AT if isinstance(task, LookAtTask) else packing.ALIGNMENT
-            joint, offset = _point(body, task.at, task.offset)
+            joint, offset = body.point(task.at, task.offset)
             axis = _direction(task, task.axis)
             return [_block(kind, task, k, 2, joint, task.level, ROTATION_STEP, offset=offset, direction=axis)]
         case PlaneTask():
-            joint, offset = _point(body, task.at, task.offset)
+            joint, offset = body.point(task.at, task.offset)
             return [_avoidance(body, packing.PLANE, task, k, joint, offset, HalfSpace(), task.margin, 0.0)]
         case ObstacleTask():
             return _obstacle(body, task, k)
@@ -187,8 +179,7 @@ def _size(task: Task, shape: Shape) -> tuple[int, Array]:
 
 
 def _obstacle(body: Articulation, task: ObstacleTask, k: int) -> list[Block]:
-    points = [_point(body, task.at, task.offset)]
-    points += [_point(body, p, (0, 0, 0)) if isinstance(p, str) else _point(body, *p) for p in task.points]
+    points = body.points([(task.at, task.offset), *task.points])
     return [
         _avoidance(body, packing.OBSTACLE, task, k, joint, offset, task.shape, task.margin, task.buffer)
         for joint, offset in points
@@ -225,7 +216,7 @@ def _coupling(body: Articulation, task: CouplingTask, k: int) -> Block:
 
 
 def _flext(body: Articulation, task: FlextTask, k: int, limits: bool) -> list[Block]:
-    joint, offset = _point(body, task.at, task.offset)
+    joint, offset = body.point(task.at, task.offset)
     limb = find_limb(body, task, joint, offset, limits)
     drag = limb.movable if task.drag is None else task.drag
     forms = {

@@ -58,7 +58,7 @@ def place_base(body: Articulation, tasks: Sequence[Task], goals: Array, state: A
         (task.level, goal[:3] - body.rest_positions[joint] - offset)
         for task, goal in zip(tasks, goals, strict=True)
         if isinstance(task, PositionTask | FlextTask) and np.all(np.abs(goal[:3]) < FAR)
-        for joint, offset in [body.place(task.at)]
+        for joint, offset in [body.point(task.at, task.offset)]
     ]
     if known:
         first = min(level for level, _ in known)

@@ -13,7 +13,7 @@ from sixpoint.body.dofs import Ball, Hinges, SwingTwist
 from sixpoint.errors import SixpointError, listed
 from sixpoint.kernels.swing_twist import build_ball_rows
 from sixpoint.solvers.prioritized.articulation import Articulation
-from sixpoint.solvers.prioritized.blocks import Block, lower_task
+from sixpoint.solvers.prioritized.blocks import lower_task
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.packing import BALL, FIXED, HINGES, Model
 from sixpoint.solvers.prioritized.tasks import BalanceTask, FlextTask, PostureTask, Task
@@ -144,7 +144,7 @@ def support_of(body: Articulation, task: BalanceTask) -> list[tuple[int, Array]]
     if task.target == "point":
         return []
     if task.support:
-        return [body.place(p) if isinstance(p, str) else _shifted(body, *p) for p in task.support]
+        return body.points(task.support)
     if body.figure is None:
         raise SixpointError("a balance task on a skeleton needs support=(...): the points on the floor")
     out: list[tuple[int, Array]] = []
@@ -157,14 +157,6 @@ def support_of(body: Articulation, task: BalanceTask) -> list[tuple[int, Array]]
         if len(foot) == 1:
             out.append((int(ankle), np.zeros(3)))
     return out
-
-
-def _shifted(body: Articulation, name: str, offset: tuple[float, float, float]) -> tuple[int, Array]:
-    joint, base = body.place(name)
-    shift = np.asarray(offset, float)
-    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
-        raise SixpointError(f"an offset is three finite numbers [m], got {offset} at {name!r}")
-    return joint, base + shift
 
 
 def posture_weights(body: Articulation, posture: PostureTask) -> Array:
@@ -223,6 +215,3 @@ def check_tasks(body: Articulation, tasks: Sequence[Task]) -> tuple[list[Task], 
             f"the posture is the lowest level: give it a level above {max(task.level for task in others)}"
         )
     return others, postures[0] if postures else None
-
-
-__all__ = ["Block", "Lowered", "check_tasks", "lower"]
