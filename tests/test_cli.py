@@ -286,7 +286,7 @@ def test_reader_warnings_are_one_line(place, capsys):
 
 def test_compilation_is_announced(place, capsys, monkeypatch):
     """A first run says why it takes a moment."""
-    monkeypatch.setattr("sixpoint.solvers.sequential.solver.is_cached", lambda name: False)
+    monkeypatch.setattr("sixpoint.solvers.six_points.solver.is_cached", lambda name: False)
     code, _, err = run(capsys, "reconstruct", "walk.bvh")
     assert (code, err) == (0, "note: compiling kernels, once (about ten seconds)\n")
 

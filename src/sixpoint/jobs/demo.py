@@ -13,7 +13,7 @@ from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.samples import SAMPLES, make_sample
-from sixpoint.solvers.sequential.solver import FIGHTING, WALKING
+from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.study.metrics import Errors, compute_errors
 
 FAST = ("boxing", "jump_kick")

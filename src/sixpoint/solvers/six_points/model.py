@@ -1,4 +1,4 @@
-"""Lower a figure to the plain arrays that the compiled steps of Sequential IK read."""
+"""Lower a figure to the plain arrays that compiled methods of six points read."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
 from sixpoint.body.figure import Figure
 from sixpoint.kernels.swing_twist import build_ball_rows
-from sixpoint.solvers.sequential.packing import STRETCH_POSES, Model
+from sixpoint.solvers.six_points.packing import STRETCH_POSES, Model
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -1,0 +1,1 @@
+"""What all methods that pose a figure from six points share."""
