@@ -15,7 +15,6 @@ from sixpoint.kernels.swing_twist import clamp
 
 COARSE, FINE = 0.1, 0.01  # rad, the steps of the spine's search
 HALF_CIRCLE, NEAR = 31, 10  # samples to either side: 63 of the circle, 21 around the best
-ALIGNED = 0.05  # sine of the angle below which a reference says nothing, about 3 degrees
 
 
 @helper
