@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,16 +17,47 @@ from sixpoint.body.dofs import Ball, Hinges
 
 FIGURE = sp.Figure.from_stature(1.75)
 NAMES = sorted(sp.SOLVERS)
-MET = {"sik": 1e-9, "pik": 1.1e-3, "pik-flext": 1.1e-3}
-"""Distance [m] at which a method counts a point as met: prioritized IK stops iterating at 1 mm."""
-REST = {"sik": 1e-12, "pik": 5e-3, "pik-flext": 5e-3}
-"""1 - cos(half angle) that the neutral pose may be off: prioritized IK relaxes elbows and knees."""
-STRETCHED = {"sik": 1e-6, "pik": 4e-2, "pik-flext": 4e-2}
-"""How far the unit vector along a stretched limb may be off."""
-SETTLED = {"sik": 1, "pik": 60, "pik-flext": 60}
-"""Frames after which a method stands still before a world that no pose can meet."""
-SCALED = {"sik": 1e-5, "pik": 0.02, "pik-flext": 0.2}
-"""Angle [rad] by which the pose of a scaled body may differ: thresholds are in metres."""
+@dataclass(frozen=True)
+class Promise:
+    """How exactly a method keeps a theorem that others keep to rounding errors.
+
+    Iterative methods stop when they are within 1 cm, or gain less than 1 mm, or after 20 iterations.
+    """
+
+    met: float = 1e-9
+    """Distance at which a reachable point counts as met [m]."""
+    share: float = 1.0
+    """Share of frames in which it is met."""
+    rest: float = 1e-12
+    """1 - cos(half angle) that the neutral pose may be off."""
+    neutral: float = 1e-12
+    """Distance that its points may be off [m]."""
+    stretched: float = 1e-6
+    """How far the unit vector along a stretched limb may be off."""
+    settled: int = 1
+    """Frames after which a method stands still before a world that no pose can meet."""
+    scaled: float = 1e-5
+    """Angle by which the pose of a scaled body may differ [rad]: thresholds are in metres."""
+    others: float = 0.03
+    """How far off the other points may be while one is lost [m]."""
+    alike: float = 0.99
+    """Share of frames of a motion that rounding errors leave alike: a stop rule or a limit may split them."""
+
+
+PRIORITIZED = Promise(met=1.1e-3, rest=5e-3, neutral=1.1e-3, stretched=4e-2, settled=60, scaled=0.02)
+PROMISES = {
+    "sik": Promise(),
+    "tgbsik": Promise(),
+    "kma": Promise(rest=0.15, neutral=0.01),  # the estimated pelvis is not the neutral one; CCD bends the spine
+    "ccd": Promise(met=0.04, rest=0.15, neutral=0.01, stretched=1e-3, settled=60, scaled=0.2, alike=0.9),
+    "jt": Promise(0.1, 0.7, 0.01, 0.02, 0.03, settled=200, scaled=0.03, others=0.15, alike=0.2),
+    "pinv": Promise(0.0101, 0.6, 0.01, 0.01, 0.08, settled=60, scaled=0.02, others=0.05),
+    "dls": Promise(0.02, 1.0, 0.01, 0.01, 0.3, settled=200, scaled=0.02),
+    "dls-svd": Promise(0.02, 1.0, 0.01, 0.01, 0.3, settled=200, scaled=0.02),
+    "sdls": Promise(0.0101, 0.95, 0.01, 0.01, 0.03, settled=200, scaled=0.1),
+    "pik": PRIORITIZED,
+    "pik-flext": replace(PRIORITIZED, scaled=0.2),
+}
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 SWAPPED = [0, 1, 3, 2, 5, 4]
 
@@ -58,10 +91,11 @@ def clips() -> dict[str, tuple[sp.Motion, sp.Targets]]:
 @pytest.mark.parametrize("name", NAMES)
 def test_neutral_points_give_the_neutral_pose(name, limits):
     """The neutral pose's own points give the neutral pose back."""
+    promise = PROMISES[name]
     solution = sp.make_solver(name, FIGURE, limits=limits).solve(points_of(FIGURE))
-    assert solution.status is sp.Status.CONVERGED
-    np.testing.assert_allclose(np.abs(solution.pose.rotations[:, 3]), 1.0, atol=REST[name])
-    np.testing.assert_allclose(solution.residual, 0.0, atol=max(1e-12, MET[name] if name != "sik" else 0.0))
+    assert (solution.status is sp.Status.CONVERGED) == (promise.neutral <= 0.01)
+    np.testing.assert_allclose(np.abs(solution.pose.rotations[:, 3]), 1.0, atol=promise.rest)
+    np.testing.assert_allclose(solution.residual, 0.0, atol=promise.neutral)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -76,9 +110,9 @@ def test_reachable_points_are_met(name, clips):
             reach += np.linalg.norm(FIGURE.offset_between(middle, end))
             goal = targets.positions[:, effector]
             near = np.linalg.norm(goal - positions[:, root], axis=1) <= reach
-            assert near.mean() > 0.6
+            assert near.mean() > (0.6 if name in ("sik", "tgbsik", "pik", "pik-flext") else 0.25)
             gap = np.linalg.norm(ends[:, effector] - goal, axis=1)
-            assert gap[near].max() < MET[name]
+            assert np.mean(gap[near] < PROMISES[name].met) >= PROMISES[name].share
 
 
 @pytest.mark.parametrize("limits", [True, False])
@@ -120,7 +154,7 @@ def test_unreachable_points_stretch_the_limb(name):
     points[2] += [2.0, 0.5, 1.0]
     points[5] += [-1.0, -2.0, 0.5]
     solver, solution = sp.make_solver(name, FIGURE, limits=False), None
-    for _ in range(SETTLED[name]):
+    for _ in range(PROMISES[name].settled):
         solution = solver.solve(points, previous=solution)
     assert solution.status is sp.Status.UNREACHABLE
     positions = as_motion(FIGURE, solution).positions[0]
@@ -128,40 +162,49 @@ def test_unreachable_points_stretch_the_limb(name):
         root, middle, end = positions[list(FIGURE.roles.limbs[limb])]
         direction = (points[effector] - root) / np.linalg.norm(points[effector] - root)
         for segment in (middle - root, end - middle):
-            np.testing.assert_allclose(segment / np.linalg.norm(segment), direction, atol=STRETCHED[name])
+            np.testing.assert_allclose(segment / np.linalg.norm(segment), direction, atol=PROMISES[name].stretched)
 
 
 @pytest.mark.parametrize("limits", [True, False])
 @pytest.mark.parametrize("name", NAMES)
 def test_mirrored_points_give_the_mirrored_pose(name, limits, clips):
     """Left and right are treated alike."""
+    names = FIGURE.skeleton.names
+    other = {"l": "r", "r": "l"}
+    twin = [names.index(other[n[0]] + n[1:]) if n[:2] in ("l_", "r_") else names.index(n) for n in names]
     for _, targets in clips.values():
         solver = sp.make_solver(name, FIGURE, limits=limits)
+        flipped = (targets.positions @ MIRROR)[:, SWAPPED]
         plain = solver.solve_motion(targets).positions
-        flipped = sp.Targets((targets.positions @ MIRROR)[:, SWAPPED], targets.rate)
-        mirrored = solver.solve_motion(flipped).positions
-        names = FIGURE.skeleton.names
-        other = {"l": "r", "r": "l"}
-        twin = [names.index(other[n[0]] + n[1:]) if n[:2] in ("l_", "r_") else names.index(n) for n in names]
-        gap = np.abs(mirrored[:, twin] @ MIRROR - plain).max(axis=(1, 2))
-        assert np.median(gap) < 1e-9
-        assert np.mean(gap < 1e-6) > 0.99  # a limit's discontinuity may split rounding errors
+        mirrored = solver.solve_motion(sp.Targets(flipped, targets.rate)).positions
+        assert_alike(name, mirrored[:, twin] @ MIRROR, plain, 1e-9)
+        alone = as_motion(FIGURE, solver.solve(targets.positions[50])).positions[0]
+        there = as_motion(FIGURE, solver.solve(flipped[50])).positions[0]
+        np.testing.assert_allclose(there[twin] @ MIRROR, alone, atol=1e-6)
+
+
+def assert_alike(name: str, positions: np.ndarray, expected: np.ndarray, median: float) -> None:
+    """Two motions agree in all frames but those that rounding errors split."""
+    gap = np.abs(positions - expected).max(axis=(1, 2))
+    alike = PROMISES[name].alike
+    assert np.mean(gap < 1e-6) > alike
+    assert np.median(gap) < median or alike < 0.5
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("vector", [(0, 2.1, 0), (0.4, -1.0, 0.7)])
 def test_a_moved_world_gives_the_moved_pose(name, vector, clips):
     """The same points in another place and orientation give the same pose there."""
-    turn, shift = Rotation.from_rotvec(vector), np.array([3.0, -1.0, 2.0])
+    turn, shift = Rotation.from_rotvec(vector).as_matrix(), np.array([3.0, -1.0, 2.0])
     for _, targets in clips.values():
         solver = sp.make_solver(name, FIGURE, limits=False)
-        moved = targets.positions @ turn.as_matrix().T + shift
+        moved = targets.positions @ turn.T + shift
         plain = solver.solve_motion(targets).positions
         there = solver.solve_motion(sp.Targets(moved, targets.rate)).positions
-        expected = plain @ turn.as_matrix().T + shift
-        gap = np.abs(there - expected).max(axis=(1, 2))
-        assert np.median(gap) < 1e-7
-        assert np.mean(gap < 1e-6) > 0.99
+        assert_alike(name, there, plain @ turn.T + shift, 1e-7)
+        alone = as_motion(FIGURE, solver.solve(targets.positions[50])).positions[0]
+        again = as_motion(FIGURE, solver.solve(moved[50])).positions[0]
+        np.testing.assert_allclose(again, alone @ turn.T + shift, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -173,7 +216,7 @@ def test_a_larger_body_takes_the_same_pose(name, clips):
     scaled = sp.Targets(targets.positions * 1.1, targets.rate)
     there = sp.make_solver(name, large, limits=False).solve_motion(scaled).rotations
     turned = Rotation.from_quat(plain.reshape(-1, 4)).inv() * Rotation.from_quat(there.reshape(-1, 4))
-    assert turned.magnitude().max() < SCALED[name]
+    assert turned.magnitude().max() < PROMISES[name].scaled
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -230,7 +273,7 @@ def test_a_lost_point_leaves_the_others_met(name, effector, clips):
     assert not (solved.status[:100] == sp.Status.LOST).any()
     gap = np.linalg.norm(measured(FIGURE, solved.motion) - positions, axis=-1)[100:140]
     others = [e for e in range(6) if e != effector]
-    assert np.nanmax(gap[:, others]) < 0.03
+    assert np.nanmax(gap[:, others]) < PROMISES[name].others
     jump = np.abs(np.diff(solved.motion.positions[98:102], axis=0)).max()
     assert jump < 0.1  # what is lost is held, it does not fall to a default
 
@@ -280,14 +323,14 @@ def test_odd_worlds_have_a_defined_result(name, points):
     }[points]
     solver = sp.make_solver(name, FIGURE)
     solution = None
-    for _ in range(SETTLED[name]):
+    for _ in range(PROMISES[name].settled):
         solution = solver.solve(world, previous=solution)
     again = solver.solve(world, previous=solution)
     assert np.isfinite(again.pose.rotations).all() and np.isfinite(again.residual).all()
     first, second = (as_motion(FIGURE, s).positions for s in (solution, again))
     assert np.abs(first - second).max() < 0.05
     if points == "far":
-        np.testing.assert_allclose(solution.residual, 0.0, atol=max(1e-6, MET[name]))
+        np.testing.assert_allclose(solution.residual, 0.0, atol=max(1e-6, PROMISES[name].neutral))
 
 
 @pytest.mark.parametrize("name", NAMES)

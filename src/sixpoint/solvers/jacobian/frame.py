@@ -160,7 +160,7 @@ def write_errors(tree, filled, world, positions, reach, small):
 
 @helper
 def solve_frame(
-    model, tree, starts, options, points, local, memory, residual, world, positions, kept, filled, long, small
+    model, tree, starts, options, points, local, memory, residual, world, positions, filled, long, small
 ):
     """Solve one frame; returns status and iterations."""
     limits, rule, damping, reach = options[3] > 0.0, int(options[4]), options[5], options[6]
@@ -174,19 +174,12 @@ def solve_frame(
     error, iterations = 1e300, 0
     while iterations < ITERATIONS:
         before = error
-        for j in range(kept.shape[0]):
-            qt.store(kept, j, qt.load(local, j))
         fill_jacobian(tree, starts, filled, local, world, positions, rows, levers)
         compute_step(rule, rows, M, small, damping, levers, part, step)
         apply_step(tree, model.balls, starts, limits, step, local)
         share_missed(tree, local, pelvis, head, world, positions)
         error = write_errors(tree, filled, world, positions, reach, small)
         iterations += 1
-        if error > before:  # the step before was the better pose
-            for j in range(kept.shape[0]):
-                qt.store(local, j, qt.load(kept, j))
-            share_missed(tree, local, pelvis, head, world, positions)
-            break
         if error < REACHED or (iterations > 1 and before - error < GAIN):
             break
     top = end_position(tree.offsets, tree.ends, world, positions, 0)
@@ -224,8 +217,7 @@ def solve_jacobian(
     tree = unpack_tree(tree_table, tree_integers)
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    world, positions, kept = work[:rows], work[rows : 2 * rows], work[2 * rows : 3 * rows]
-    filled = work[3 * rows :]
+    world, positions, filled = work[:rows], work[rows : 2 * rows], work[2 * rows :]
     for f in range(points.shape[0]):
         outcome[f, 0], outcome[f, 1] = solve_frame(
             model,
@@ -238,7 +230,6 @@ def solve_jacobian(
             residual[f],
             world,
             positions,
-            kept,
             filled,
             long,
             small,

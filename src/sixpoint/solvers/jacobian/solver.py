@@ -83,5 +83,5 @@ class JacobianIK(SixPointSolver):
         return (*super()._lower(model), *pack_tree(tree), np.cumsum(sizes) - sizes)
 
     def _make_work(self) -> tuple[Array, ...]:
-        work = np.zeros((3 * (self._trunk + LIMB_ROWS) + 6, 4))
+        work = np.zeros((2 * (self._trunk + LIMB_ROWS) + 6, 4))
         return (work, np.zeros((LONG_ROWS, self._size)), np.zeros((SMALL_ROWS, M)))

@@ -1,9 +1,9 @@
 """How a frame of six points begins and ends, whatever the method.
 
-State between frames is one array (rows + 5, 4): ``local`` (rows, 4) are the anatomical local rotations of
-the posed joints and ``memory`` (5, 4) holds the estimated X axis, the bending plane's normal (zero if none),
-the positions of pelvis and head, and in its last row whether there was a frame before and whether
-the X axis was ever told by wrists or ankles.
+State between frames is one array (rows + 6, 4): ``local`` (rows, 4) are the anatomical local rotations of
+the posed joints and ``memory`` (6, 4) holds the estimated X axis, the bending plane's normal (zero if none),
+the positions of pelvis and head, whether there was a frame before and whether the X axis was ever told by
+wrists or ankles, and the estimated Y axis.
 """
 
 from sixpoint.kernels import quaternion as qt
@@ -11,7 +11,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.six_points.pelvis import estimate_x, says_something
 
-MEMORY_ROWS = 5
+MEMORY_ROWS = 6
 FAR = 1e7  # m, a point farther away than this, or not a number, counts as lost
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 REACHED = 0.01  # m, the paper's stop criterion (Unzueta et al. 2008, section 9)
@@ -51,8 +51,7 @@ def estimate_pelvis(filled, memory, w1, w2, w3):
     """Estimated X and Y axes of the pelvis (Unzueta et al. 2008, section 4)."""
     y = vec.unit(vec.sub(vec.load(filled, 1), vec.load(filled, 0)))
     if vec.norm(y) < 0.5:  # pelvis and head coincide: the trunk keeps its direction
-        y = vec.unit(vec.sub(vec.load(memory, 3), vec.load(memory, 2)))
-        y = y if vec.norm(y) > 0.5 else (0.0, 1.0, 0.0)
+        y = vec.load(memory, 5) if memory[4, 0] > 0.0 else (0.0, 1.0, 0.0)
     x = estimate_x(filled, y, vec.load(memory, 0), memory[4, 1] > 0.0, w1, w2, w3)
     return x, y
 
@@ -65,6 +64,7 @@ def end_trunk(filled, memory, x, y, root, top, residual):
         memory[4, 1] = 1.0
     vec.store(memory, 2, root)
     vec.store(memory, 3, top)
+    vec.store(memory, 5, y)
     memory[4, 0] = 1.0
     residual[0] = vec.norm(vec.sub(vec.load(filled, 0), root)) if filled[0, 3] > 0.0 else 0.0
     residual[1] = vec.norm(vec.sub(vec.load(filled, 1), top)) if filled[1, 3] > 0.0 else 0.0
