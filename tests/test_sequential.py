@@ -17,10 +17,10 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.solvers.sequential.bending import flat_chord, search_angle
 from sixpoint.solvers.sequential.clavicle import solve_clavicle
 from sixpoint.solvers.sequential.limb import solve_limb
+from sixpoint.solvers.sequential.spine import bending_axis, chord_of, place_trunk, stretch
 from sixpoint.solvers.six_points.model import build_model
 from sixpoint.solvers.six_points.pelvis import estimate_x
 from sixpoint.solvers.six_points.solver import weights_at_rate
-from sixpoint.solvers.sequential.spine import bending_axis, chord_of, place_trunk, stretch
 from test_solvers import FIGURE, as_motion, points_of
 
 MODEL = build_model(FIGURE)

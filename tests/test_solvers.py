@@ -17,6 +17,8 @@ from sixpoint.body.dofs import Ball, Hinges
 
 FIGURE = sp.Figure.from_stature(1.75)
 NAMES = sorted(sp.SOLVERS)
+
+
 @dataclass(frozen=True)
 class Promise:
     """How exactly a method keeps a theorem that others keep to rounding errors.
@@ -48,7 +50,9 @@ PRIORITIZED = Promise(met=1.1e-3, rest=5e-3, neutral=1.1e-3, stretched=4e-2, set
 PROMISES = {
     "sik": Promise(),
     "tgbsik": Promise(),
-    "kma": Promise(rest=0.15, neutral=0.01),  # the estimated pelvis is not the neutral one; CCD bends the spine
+    "kma": Promise(
+        rest=0.15, neutral=0.01
+    ),  # the estimated pelvis is not the neutral one; CCD bends the spine
     "ccd": Promise(met=0.04, rest=0.15, neutral=0.01, stretched=1e-3, settled=60, scaled=0.2, alike=0.9),
     "jt": Promise(0.1, 0.7, 0.01, 0.02, 0.03, settled=200, scaled=0.03, others=0.15, alike=0.2),
     "pinv": Promise(0.0101, 0.6, 0.01, 0.01, 0.08, settled=60, scaled=0.02, others=0.05),
@@ -162,7 +166,9 @@ def test_unreachable_points_stretch_the_limb(name):
         root, middle, end = positions[list(FIGURE.roles.limbs[limb])]
         direction = (points[effector] - root) / np.linalg.norm(points[effector] - root)
         for segment in (middle - root, end - middle):
-            np.testing.assert_allclose(segment / np.linalg.norm(segment), direction, atol=PROMISES[name].stretched)
+            np.testing.assert_allclose(
+                segment / np.linalg.norm(segment), direction, atol=PROMISES[name].stretched
+            )
 
 
 @pytest.mark.parametrize("limits", [True, False])

@@ -20,6 +20,9 @@ from sixpoint.errors import FigureError, FormatError, SixpointError, SkeletonErr
 from sixpoint.formats import load, load_targets, save, save_targets
 from sixpoint.samples import SAMPLES, make_sample
 from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
+from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
+from sixpoint.solvers.jacobian.solver import JacobianIK
+from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
 from sixpoint.solvers.prioritized.tasks import (
     AlignTask,
@@ -39,6 +42,8 @@ from sixpoint.solvers.prioritized.tasks import (
 )
 from sixpoint.solvers.registry import SOLVERS, make_solver
 from sixpoint.solvers.sequential.solver import SequentialIK
+from sixpoint.solvers.tgb.limb import AnalyticLimb
+from sixpoint.solvers.tgb.solver import TGBSequentialIK
 from sixpoint.study.metrics import Errors, compute_errors
 
 __version__ = "0.1.0"
@@ -48,11 +53,13 @@ __all__ = [
     "SAMPLES",
     "SOLVERS",
     "AlignTask",
+    "AnalyticLimb",
     "BalanceTask",
     "Ball",
     "Box",
     "Capsule",
     "CouplingTask",
+    "CyclicCoordinateDescent",
     "Dofs",
     "Errors",
     "Figure",
@@ -62,6 +69,8 @@ __all__ = [
     "FormatError",
     "HalfSpace",
     "Hinges",
+    "JacobianIK",
+    "KulpaMultonArnaldi",
     "Limits",
     "LookAtTask",
     "Motion",
@@ -82,6 +91,7 @@ __all__ = [
     "Sphere",
     "Status",
     "SwingTwist",
+    "TGBSequentialIK",
     "TargetError",
     "Targets",
     "compute_errors",

@@ -12,12 +12,12 @@ from typing import Any
 from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.base import Solver
-from sixpoint.solvers.ccd import CyclicCoordinateDescent
+from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
 from sixpoint.solvers.jacobian.solver import JacobianIK
-from sixpoint.solvers.kma import KulpaMultonArnaldi
+from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
 from sixpoint.solvers.sequential.solver import SequentialIK
-from sixpoint.solvers.tgbsik import TGBSequentialIK
+from sixpoint.solvers.tgb.solver import TGBSequentialIK
 
 SOLVERS: dict[str, Callable[..., Solver]] = {
     "sik": SequentialIK,

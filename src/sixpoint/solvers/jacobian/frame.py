@@ -144,12 +144,14 @@ def share_missed(tree, local, pelvis, head, world, positions):
 
 @helper
 def write_errors(tree, filled, world, positions, reach, small):
-    """Errors of the ends, each at most ``reach`` long, into their row; returns the largest of the whole ones."""
+    """Errors of the ends, each at most ``reach`` long, into their row; returns the largest in full."""
     row, largest = error_row(small), 0.0
     for end in range(ENDS):
         e = (0.0, 0.0, 0.0)
         if filled[end + 1, 3] > 0.0 or end == 0:
-            e = vec.sub(vec.load(filled, end + 1), end_position(tree.offsets, tree.ends, world, positions, end))
+            e = vec.sub(
+                vec.load(filled, end + 1), end_position(tree.offsets, tree.ends, world, positions, end)
+            )
         length = vec.norm(e)
         largest = max(largest, length)
         factor = reach / length if length > reach else 1.0
@@ -185,9 +187,7 @@ def solve_frame(
     top = end_position(tree.offsets, tree.ends, world, positions, 0)
     end_trunk(filled, memory, x, y, vec.load(positions, 0), top, residual)
     for end in range(1, ENDS):
-        gap = vec.sub(
-            vec.load(filled, end + 1), end_position(tree.offsets, tree.ends, world, positions, end)
-        )
+        gap = vec.sub(vec.load(filled, end + 1), end_position(tree.offsets, tree.ends, world, positions, end))
         residual[end + 1] = vec.norm(gap) if filled[end + 1, 3] > 0.0 else 0.0
     return judge(lost, residual), iterations
 

@@ -14,9 +14,9 @@ from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.jacobian import steps
 from sixpoint.solvers.jacobian.frame import LONG_ROWS, SMALL_ROWS, M, solve_jacobian
-from sixpoint.solvers.six_points.packing import LIMB_ROWS, Model
-from sixpoint.solvers.six_points.solver import WALKING, SixPointSolver
-from sixpoint.solvers.six_points.tree import BALL, build_tree, pack_tree
+from sixpoint.solvers.six_points.packing import Model
+from sixpoint.solvers.six_points.solver import WALKING, TreeSolver
+from sixpoint.solvers.six_points.tree import BALL, Tree
 
 Array = NDArray[np.float64]
 
@@ -28,12 +28,12 @@ RULES = {
     "sdls": steps.SDLS,
 }
 DAMPING = 0.075
-"""Damping factor [m]. The paper's "75" has no unit; as millimetres, or as a square in centimetres, it is this."""
+"""Damping factor [m]. The paper's "75" has no unit; as millimetres it is this, as cm^2 nearly so."""
 REACH = 0.1
 """Farthest that one iteration asks an end to move [m]."""
 
 
-class JacobianIK(SixPointSolver):
+class JacobianIK(TreeSolver):
     """Numerical IK of head, wrists and ankles at once, by steps of the joint angles.
 
     Args:
@@ -67,21 +67,25 @@ class JacobianIK(SixPointSolver):
         if step not in RULES:
             raise SixpointError(f"no step rule named {step!r}; there are: {listed(RULES)}")
         if not 0 < damping < np.inf or not 0 < reach < np.inf:
-            raise SixpointError(f"damping and reach are positive lengths in metres, got {damping} and {reach}")
+            raise SixpointError(
+                f"damping and reach are positive lengths in metres, got {damping} and {reach}"
+            )
         self.step, self.damping, self.reach, self.solve_root = step, float(damping), float(reach), solve_root
         super().__init__(figure, weights=weights, limits=limits)
 
     def _numbers(self) -> tuple[float, ...]:
         return (RULES[self.step], self.damping, self.reach)
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
-        tree = build_tree(self.figure, model)
+    def _build_tree(self, model: Model) -> Tree:
+        tree = super()._build_tree(model)
         if self.solve_root:
             tree.kind[0] = BALL
         sizes = np.array([0, 3, 1])[tree.kind]
-        self._size = int(sizes.sum())
-        return (*super()._lower(model), *pack_tree(tree), np.cumsum(sizes) - sizes)
+        self._starts, self._size = np.cumsum(sizes) - sizes, int(sizes.sum())
+        return tree
+
+    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+        return (*super()._lower(model), self._starts)
 
     def _make_work(self) -> tuple[Array, ...]:
-        work = np.zeros((2 * (self._trunk + LIMB_ROWS) + 6, 4))
-        return (work, np.zeros((LONG_ROWS, self._size)), np.zeros((SMALL_ROWS, M)))
+        return (*super()._make_work(), np.zeros((LONG_ROWS, self._size)), np.zeros((SMALL_ROWS, M)))

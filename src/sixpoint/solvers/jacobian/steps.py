@@ -59,7 +59,7 @@ def cap(step, largest):
 
 @helper
 def transpose_step(rows, m, small, step):
-    """dq = a J^T e with the a that brings J dq nearest to e."""
+    """Dq = a J^T e with the a that brings J dq nearest to e."""
     error = error_row(small)
     combine(rows, 0, m, small, error, step)
     along, square = 0.0, 0.0
@@ -123,7 +123,7 @@ def singular_value(small, m, i):
 
 @helper
 def filtered_step(rows, m, small, rule, damping, step):
-    """dq = sum of f(s_i) v_i u_i^T e: the pseudoinverse (1 / s) or damped least squares (s / (s^2 + l^2))."""
+    """Dq = sum of f(s_i) v_i u_i^T e: the pseudoinverse (1 / s) or damped least squares (s / (s^2 + l^2))."""
     rank = decompose(rows, m, small)
     error, answer = error_row(small), answer_row(small)
     largest = 0.0

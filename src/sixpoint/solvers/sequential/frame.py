@@ -167,7 +167,7 @@ def place_limb(model, settings, limb, root, target, local, world, segs):
 
 @helper
 def solve_frame(model, settings, points, local, memory, residual, scratch):
-    """Solve one frame; updates ``local``, ``memory`` and ``residual`` (6,) [m] in place; returns the status."""
+    """Solve one frame; updates ``local``, ``memory``, ``residual`` (6,) [m] in place; returns the status."""
     lost, root = pose_trunk(model, settings, points, local, memory, residual, scratch)
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     for limb in range(4):  # arms, then legs; neither depends on the other

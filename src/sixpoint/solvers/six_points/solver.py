@@ -1,4 +1,4 @@
-"""The class behind every compiled method of the six points: lowers the figure, carries the state, runs frames."""
+"""What is behind every compiled method of the six points: figure in, frames through, state along."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
 from sixpoint.solvers.six_points.frame import MEMORY_ROWS
 from sixpoint.solvers.six_points.model import build_model
 from sixpoint.solvers.six_points.packing import LIMB_ROWS, Model, pack_model
+from sixpoint.solvers.six_points.tree import Tree, build_tree, pack_tree
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,8 @@ class SixPointSolver(ABC):
         entry(*arrays, *work, options, points, state, rotations, pelvis, outcome, residual)
 
     where ``arrays`` are those of ``_lower``, ``work`` those of ``_make_work``, ``options`` the weights at the
-    frame rate, whether limits hold and the numbers of ``_numbers``; ``outcome`` (F, 2) are status and iterations.
+    frame rate, whether limits hold and the numbers of ``_numbers``; ``outcome`` (F, 2) are status and
+    iterations.
 
     Args:
         figure: What to pose.
@@ -204,3 +206,16 @@ def weights_at_rate(weights: tuple[float, float, float], dt: float) -> tuple[flo
     kept = (w3 / (new + w3)) ** (120.0 * min(dt, 1e3))
     scale = w3 * (1.0 - kept) / kept / new if kept > 1e-12 else 1e12
     return w1 * scale, w2 * scale, w3
+
+
+class TreeSolver(SixPointSolver):
+    """A method that sees the posed joints as a plain tree, see ``six_points.tree``."""
+
+    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+        return (*super()._lower(model), *pack_tree(self._build_tree(model)))
+
+    def _build_tree(self, model: Model) -> Tree:
+        return build_tree(self.figure, model)
+
+    def _make_work(self) -> tuple[Array, ...]:
+        return (np.zeros((2 * (self._trunk + LIMB_ROWS) + 6, 4)),)

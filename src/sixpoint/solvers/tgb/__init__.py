@@ -1,1 +1,1 @@
-"""The analytic limb of Tolani, Goswami and Badler 2000: every posture that reaches, by its swivel angle."""
+"""The analytic limb of Tolani, Goswami and Badler 2000, and TGBSIK: Sequential IK with such limbs."""

@@ -112,7 +112,9 @@ def finish(root, flexion, n, d, l1, l2, h, limits, balls, ball, low, high):
 @helper
 def effort(root, weight):
     """Swing squared plus weight times twist squared of a limb's root joint [rad^2]."""
-    swing = acos(min(max(qt.y_axis(root)[1], -1.0), 1.0))  # the segment and its neutral direction, both along -Y
+    swing = acos(
+        min(max(qt.y_axis(root)[1], -1.0), 1.0)
+    )  # the segment and its neutral direction, both along -Y
     twist = qt.twist_angle(root, (0.0, -1.0, 0.0))
     return swing * swing + weight * twist * twist
 
@@ -138,11 +140,3 @@ def solve_easiest(target, l1, l2, h, weight, limits, balls, ball, low, high):
                 best, least = phi, cost
     root = root_at(n, u, cosine, sine, h, best)
     return finish(root, flexion, n, d, l1, l2, h, limits, balls, ball, low, high)
-
-
-@helper
-def is_free(root, flexion, balls, ball, low, high):
-    """Whether a limb's joints are within their limits."""
-    _, changed = clamp(balls, ball, root)
-    return not changed and low <= flexion <= high
-

@@ -1,25 +1,18 @@
 """KMA: the trunk by CCD from a standing pose, limbs at a fixed swivel angle.
 
 As Unzueta et al. 2008 adapt the method: every frame starts from the standing pose; the root is placed and
-turned by its estimate, the spine is solved by CCD, clavicles stay at rest, legs and arms close in the plane of
-a reference direction of the pelvis. Where a limb points along its reference another one takes over, and the
-swivel may jump. The original's trunk of three segments and its spline are left out, as in their study.
+turned by its estimate, the spine is solved by CCD, clavicles stay at rest, legs and arms close in the plane
+of a reference direction of the pelvis. Where a limb points along its reference another one takes over, and
+the swivel may jump. The original's trunk of three segments and its spline are left out, as in their study.
 
 References: Kulpa, Multon, Arnaldi, "Morphology-independent representation of motions for interactive
 human-like animation", Computer Graphics Forum 24 (2005); Unzueta et al. 2008, section 9.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
-from sixpoint.solvers.ccd import solve_spine
+from sixpoint.solvers.ccd.frame import solve_spine
 from sixpoint.solvers.six_points.frame import (
     MEMORY_ROWS,
     end_trunk,
@@ -28,19 +21,16 @@ from sixpoint.solvers.six_points.frame import (
     judge,
     write_frame,
 )
-from sixpoint.solvers.six_points.packing import LIMB_ROWS, Model, limb_row, unpack_model
-from sixpoint.solvers.six_points.solver import SixPointSolver
-from sixpoint.solvers.six_points.tree import build_tree, pack_tree, place_chain, unpack_tree
+from sixpoint.solvers.six_points.packing import LIMB_ROWS, limb_row, unpack_model
+from sixpoint.solvers.six_points.tree import place_chain, unpack_tree
 from sixpoint.solvers.tgb.swivel import solve_at
-
-Array = NDArray[np.float64]
 
 ALIGNED = 0.05  # sine of the angle below which a limb runs along its reference: about 3 degrees
 
 
 @helper
 def reference_of(limb, pelvis, n):
-    """Direction of the middle joint's side, in the world: for arms down, else back; for legs forward, else up."""
+    """Where the middle joint is to be, in the world: for arms down, else back; for legs forward, else up."""
     if limb < 2:
         first = vec.scale(-1.0, qt.y_axis(pelvis))
         second = vec.scale(-1.0, qt.z_axis(pelvis))
@@ -130,22 +120,3 @@ def solve_kma(
             model, tree, options, points[f], local, memory, residual[f], world, positions, filled
         )
         write_frame(model, local, memory, rotations[f], pelvis[f])
-
-
-class KulpaMultonArnaldi(SixPointSolver):
-    """KMA as adapted by Unzueta et al. 2008.
-
-    Args:
-        figure: What to pose.
-        weights: Of the pelvis estimate, see ``SixPointSolver``; it alone remembers the last frame.
-        limits: Keep every joint within the figure's limits: the spine at each step, limbs at the end.
-    """
-
-    name = "kma"
-    _entry = staticmethod(solve_kma)
-
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
-        return (*super()._lower(model), *pack_tree(build_tree(self.figure, model)))
-
-    def _make_work(self) -> tuple[Array, ...]:
-        return (np.zeros((2 * (self._trunk + LIMB_ROWS) + 6, 4)),)

@@ -7,24 +7,14 @@ References: Tolani, Goswami, Badler, "Real-time inverse kinematics techniques fo
 Graphical Models 62 (2000) 353-388; Unzueta et al. 2008, section 9.
 """
 
-from __future__ import annotations
-
-import numpy as np
-from numpy.typing import NDArray
-
-from sixpoint.body.figure import Figure
-from sixpoint.errors import SixpointError
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
 from sixpoint.solvers.sequential.frame import place_limb, pose_trunk
-from sixpoint.solvers.sequential.packing import unpack_settings, unpack_work, work_rows
+from sixpoint.solvers.sequential.packing import unpack_settings, unpack_work
 from sixpoint.solvers.six_points.frame import MEMORY_ROWS, judge, write_frame
 from sixpoint.solvers.six_points.packing import limb_row, unpack_model
-from sixpoint.solvers.six_points.solver import WALKING, SixPointSolver
 from sixpoint.solvers.tgb.swivel import solve_easiest
-
-Array = NDArray[np.float64]
 
 
 @helper
@@ -73,39 +63,3 @@ def solve_tgbsik(
         )
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])
-
-
-class TGBSequentialIK(SixPointSolver):
-    """Sequential IK with limbs at the swivel angle of least effort.
-
-    Args:
-        figure: What to pose.
-        weights: Of the pelvis estimate, see ``SixPointSolver``.
-        limits: Keep every joint within the figure's limits; limbs are clamped at the end.
-        twist_weight: Weight of twist against swing of shoulders and hips.
-
-    Raises:
-        SixpointError: An option has an impossible value.
-    """
-
-    name = "tgbsik"
-    _entry = staticmethod(solve_tgbsik)
-
-    def __init__(
-        self,
-        figure: Figure,
-        *,
-        weights: tuple[float, float, float] = WALKING,
-        limits: bool = True,
-        twist_weight: float = 1.0,
-    ) -> None:
-        if not 0 <= twist_weight < np.inf:
-            raise SixpointError(f"the weight of twist is a number from 0, got {twist_weight}")
-        super().__init__(figure, weights=weights, limits=limits)
-        self.twist_weight = float(twist_weight)
-
-    def _numbers(self) -> tuple[float, ...]:
-        return (0.0, 0.0, 0.0, self.twist_weight)  # exact search, clavicles from rest, trunk not aligned
-
-    def _make_work(self) -> tuple[Array, ...]:
-        return (np.empty((work_rows(self._trunk), 4)),)

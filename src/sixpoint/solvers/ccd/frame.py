@@ -1,23 +1,16 @@
 """Cyclic Coordinate Descent: turn one joint after another so that the end comes nearest to its target.
 
 As Unzueta et al. 2008 set it up for a whole body: the root is placed and turned by its estimate, then the
-spine is solved, then each clavicle with its arm, then the legs, each from the pose of the last frame. What the
-spine misses is shared between pelvis and head.
+spine is solved, then each clavicle with its arm, then the legs, each from the pose of the last frame. What
+the spine misses is shared between pelvis and head.
 
 References: Wang and Chen, "A combined optimization method for solving the inverse kinematics problem of
-mechanical manipulators", IEEE Transactions on Robotics and Automation 7 (1991); Unzueta et al. 2008, section 9.
+mechanical manipulators", IEEE Transactions on Robotics and Automation 7 (1991) 489-499; Unzueta et al. 2008,
+section 9.
 """
 
-from __future__ import annotations
-
 from math import atan2
-from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sixpoint.body.figure import Figure
-from sixpoint.errors import SixpointError
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
@@ -31,20 +24,15 @@ from sixpoint.solvers.six_points.frame import (
     judge,
     write_frame,
 )
-from sixpoint.solvers.six_points.packing import LIMB_ROWS, Model, unpack_model
-from sixpoint.solvers.six_points.solver import WALKING, SixPointSolver
+from sixpoint.solvers.six_points.packing import unpack_model
 from sixpoint.solvers.six_points.tree import (
     BALL,
     FIXED,
-    build_tree,
     clamp_hinge,
     end_position,
-    pack_tree,
     place_chain,
     unpack_tree,
 )
-
-Array = NDArray[np.float64]
 
 SWEEPS = 20  # the stop rule of Unzueta et al. 2008, section 9: 20 iterations, 1 cm, or a gain below 1 mm
 GAIN = 1e-3  # m
@@ -96,7 +84,7 @@ def turn_joint(tree, balls, limits, j, end, target, local, world, positions):
 
 @helper
 def sweep(tree, balls, limits, from_root, first, count, stride, end, target, local, world, positions):
-    """One pass over a chain of joints, from its tip to its root or back; the chain is placed before and after."""
+    """One pass over a chain, from its tip to its root or back; its joints are placed before and after."""
     place = end_position(tree.offsets, tree.ends, world, positions, end)
     for k in range(count):
         j = first + stride * (k if from_root else count - 1 - k)
@@ -138,7 +126,7 @@ def solve_spine(tree, balls, limits, from_root, count, pelvis, head, local, worl
 
 @helper
 def solve_chain(tree, balls, limits, from_root, first, count, end, target, local, world, positions):
-    """A limb whose joints are two rows apart, its hinge the last; returns the number of sweeps and the residual."""
+    """A limb whose joints are two rows apart, its hinge the last; returns sweeps and residual."""
     hinge = first + 2 * (count - 1)
     place_chain(tree.offsets, tree.parents, local, first, count, 2, world, positions)
     error = vec.norm(vec.sub(target, end_position(tree.offsets, tree.ends, world, positions, end)))
@@ -212,43 +200,3 @@ def solve_ccd(
             model, tree, options, points[f], local, memory, residual[f], world, positions, filled
         )
         write_frame(model, local, memory, rotations[f], pelvis[f])
-
-
-class CyclicCoordinateDescent(SixPointSolver):
-    """CCD on spine, arms and legs.
-
-    Args:
-        figure: What to pose.
-        weights: Of the pelvis estimate, see ``SixPointSolver``.
-        limits: Keep every joint within the figure's limits, at each step.
-        order: "tip" sweeps from the end of a chain to its root, "root" the other way; the paper's text says
-            both, its results speak for "tip".
-
-    Raises:
-        SixpointError: An option has an impossible value.
-    """
-
-    name = "ccd"
-    _entry = staticmethod(solve_ccd)
-
-    def __init__(
-        self,
-        figure: Figure,
-        *,
-        weights: tuple[float, float, float] = WALKING,
-        limits: bool = True,
-        order: Literal["tip", "root"] = "tip",
-    ) -> None:
-        if order not in ("tip", "root"):
-            raise SixpointError(f"order is 'tip' or 'root', got {order!r}")
-        super().__init__(figure, weights=weights, limits=limits)
-        self.order = order
-
-    def _numbers(self) -> tuple[float, ...]:
-        return (self.order == "root",)
-
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
-        return (*super()._lower(model), *pack_tree(build_tree(self.figure, model)))
-
-    def _make_work(self) -> tuple[Array, ...]:
-        return (np.zeros((2 * (self._trunk + LIMB_ROWS) + 6, 4)),)

@@ -1,0 +1,1 @@
+"""Cyclic Coordinate Descent (Wang and Chen 1991)."""

@@ -1,0 +1,1 @@
+"""KMA (Kulpa, Multon and Arnaldi 2005) as adapted by Unzueta et al. 2008."""
