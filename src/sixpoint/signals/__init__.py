@@ -1,0 +1,1 @@
+"""Arrays over time in, arrays over time out: velocities, foot contacts, swivel angles. Knows no skeleton."""

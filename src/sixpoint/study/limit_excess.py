@@ -1,0 +1,64 @@
+"""How far is a motion outside a figure's joint limits? Recomputed from the written rotations.
+
+Reference: Unzueta et al. 2008, section 7.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.dofs import Ball, Hinges, JointDof, SwingTwist
+from sixpoint.body.figure import Figure
+from sixpoint.body.motion import Motion
+from sixpoint.study.movement import compute_local_rotations
+
+Array = NDArray[np.float64]
+
+ANTIPODE = 1e-6  # nearer to the antipode of the neutral direction there is no twist [rad]
+
+
+def compute_limit_excess(figure: Figure, motion: Motion) -> Array:
+    """Angle (F, J) by which each joint is outside its limits [rad]; zero inside and where there are none.
+
+    Of a ball it is the larger of the excess of swing and of twist, of several hinges the largest.
+    """
+    excess = np.zeros((len(motion), len(figure.skeleton)))
+    joints = sorted(figure.dofs.joints)
+    local = compute_local_rotations(figure, motion, joints)
+    for k, joint in enumerate(joints):
+        excess[:, joint] = _excess(figure.dofs[joint], local[:, k])
+    return excess
+
+
+def _excess(dof: JointDof, local: Array) -> Array:
+    """(F,) excess [rad] of local rotations (F, 4)."""
+    if isinstance(dof, Hinges):
+        angles = dof.compute_angles(local)
+        return np.asarray(np.maximum(dof.lower - angles, angles - dof.upper).max(axis=-1).clip(min=0.0))
+    if isinstance(dof, Ball) and dof.limit is not None:
+        return np.maximum(*swing_twist_excess(dof.limit, local))
+    return np.zeros(len(local))
+
+
+def swing_twist_excess(limit: SwingTwist, local: Array) -> tuple[Array, Array]:
+    """How far swing and twist (F,) of rotations (F, 4) are outside [rad], never negative.
+
+    The swing's excess is the angle back to the limit: straight, or over the antipode of the neutral
+    direction where that is nearer. So an arm that may be lifted to 180 degrees in front is five degrees out
+    when it is overhead and five degrees behind. At the antipode itself no direction and no twist is defined;
+    it is inside where any direction reaches it.
+    """
+    segment = rot.mul_vec(local, limit.axis)
+    along = segment @ limit.axis
+    psi = np.arctan2(np.linalg.norm(segment - along[:, None] * limit.axis, axis=-1), along)
+    theta = np.arctan2(segment @ limit.side, segment @ limit.forward)
+    over = 2.0 * np.pi - psi - limit.psi.max()
+    swing = np.minimum(psi - limit.compute_limit(theta), over)
+
+    tau = 2.0 * np.arctan2(local[:, :3] @ limit.axis, local[:, 3])
+    least, most = limit.twist
+    from_middle = (tau - 0.5 * (least + most) + np.pi) % (2.0 * np.pi) - np.pi
+    twist = np.where(psi < np.pi - ANTIPODE, np.abs(from_middle) - 0.5 * (most - least), 0.0)
+    return swing.clip(min=0.0), twist.clip(min=0.0)
