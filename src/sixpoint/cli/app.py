@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError
 
 import sixpoint
 from sixpoint.cli.convert import convert
+from sixpoint.cli.data import data
 from sixpoint.cli.demo import demo
 from sixpoint.cli.info import info
 from sixpoint.cli.reconstruct import reconstruct
@@ -33,7 +34,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, convert, info, study):
+    for command in (demo, reconstruct, convert, info, study, data):
         app.command(command)
     return app
 

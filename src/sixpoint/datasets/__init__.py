@@ -1,0 +1,1 @@
+"""Public recordings, fetched on request: where they are, how they arrive whole, what their hashes were."""
