@@ -19,6 +19,7 @@ ALLOWED = {
     "datasets": {"datasets", "errors"},
     "solvers": {"solvers", "kernels", "body", "errors"},
     "study": {"study", "signals", "body", "errors"},
+    "studies": set(),
     "jobs": {"jobs", "solvers", "formats", "samples", "datasets", "study", "body", "errors"},
     "cli": {"cli", "jobs", "study", "solvers", "body", "errors"},
     "__main__": {"cli"},

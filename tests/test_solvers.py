@@ -53,7 +53,7 @@ PROMISES = {
     "kma": Promise(
         rest=0.15, neutral=0.01
     ),  # the estimated pelvis is not the neutral one; CCD bends the spine
-    "ccd": Promise(met=0.04, rest=0.15, neutral=0.01, stretched=1e-3, settled=60, scaled=0.2, alike=0.9),
+    "ccd": Promise(met=0.04, rest=0.15, neutral=0.01, stretched=1e-3, settled=60, scaled=0.2, alike=0.5),
     "jt": Promise(0.1, 0.7, 0.01, 0.02, 0.03, settled=200, scaled=0.03, others=0.15, alike=0.2),
     "pinv": Promise(0.0101, 0.6, 0.01, 0.01, 0.08, settled=60, scaled=0.02, others=0.05),
     "dls": Promise(0.02, 1.0, 0.01, 0.01, 0.3, settled=200, scaled=0.02),

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 import sixpoint
+from sixpoint.cli.compare import compare
 from sixpoint.cli.convert import convert
 from sixpoint.cli.data import data
 from sixpoint.cli.demo import demo
@@ -34,7 +35,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, convert, info, study, data):
+    for command in (demo, reconstruct, compare, convert, info, study, data):
         app.command(command)
     return app
 

@@ -51,3 +51,44 @@ def flext(
     screen.say(f"written to {out}{os.sep}: {', '.join(path.name for path in done.files)}")
     screen.say("next:", style="bold")
     screen.rows([(f"read {done.files[-1]}", "what is seen, and whether it agrees with the paper")])
+
+
+@study.command
+def sik(
+    *,
+    out: Annotated[Path, Parameter(help="Folder to write into.")] = Path("study/sik"),
+    data: Annotated[
+        Path | None,
+        Parameter(
+            help="Folder with the recordings of the paper; built-in motions in their place by default."
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Make the figures of the Sequential IK paper: spine, clavicle, limb, limits, samples and hierarchy.
+
+    Writes eight pictures (PNG) and a report (Markdown) with all numbers. Needs no file; with `--data` the
+    samples are of the paper's recordings, CMU 17_10, 90_05 and 01_03.
+
+    For example:
+
+    ```
+    sixpoint study sik
+    sixpoint study sik --data data/cmu --out /tmp/sik --force
+    ```
+    """
+    from sixpoint.jobs.study_sik import study_sik
+    from sixpoint.jobs.study_sik_report import CLIP_COLUMNS, clip_rows, spine_columns, spine_rows
+
+    screen = Screen()
+    with screen.progress() as progress:
+        done = study_sik(out, data=data, force=force, progress=progress)
+    screen.say("a spine between pelvis and head: their distance, and the turn of each joint", style="bold")
+    screen.table(spine_columns(done.spine), spine_rows(done.spine))
+    screen.say()
+    screen.say("whole clips from six points", style="bold")
+    screen.table(CLIP_COLUMNS, clip_rows(done.clips), texts=(0, 1))
+    screen.say()
+    screen.say(f"written to {out}{os.sep}: {', '.join(path.name for path in done.files)}")
+    screen.say("next:", style="bold")
+    screen.rows([(f"read {done.files[-1]}", "what is seen, with its numbers")])

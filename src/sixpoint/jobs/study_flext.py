@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.errors import FormatError
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
@@ -23,6 +22,7 @@ from sixpoint.jobs.study_flext_body import (
     squat_and_kick,
 )
 from sixpoint.jobs.study_flext_limb import BENDS, GOALS, METHODS, LimbRun, flex_all, hand_angle, postures
+from sixpoint.jobs.writing import prepare_folder
 
 if TYPE_CHECKING:
     from sixpoint.study.flext_plots import Traces
@@ -80,7 +80,7 @@ def study_flext(out: Path, *, force: bool = False, progress: Progress = silent) 
     # Matplotlib is slow to import
     from sixpoint.study.flext_plots import draw_convergence, draw_kick, draw_postures, draw_reach
 
-    _prepare_folder(out, force)
+    prepare_folder(out, force)
     figure = Figure.from_stature(STATURE)
     files = [out / name for name in PICTURES]
     steps = 4 + 2 * len(BUDGETS)
@@ -109,17 +109,6 @@ def study_flext(out: Path, *, force: bool = False, progress: Progress = silent) 
     write_files({out / REPORT: report(study).encode()}, force=True)
     progress("studying FLEXT", steps, steps)
     return study
-
-
-def _prepare_folder(out: Path, force: bool) -> None:
-    if out.exists() and not out.is_dir():
-        raise FormatError(out, "this is a file; the study needs a folder")
-    try:
-        if not force and out.exists() and any(out.iterdir()):
-            raise FormatError(out, "exists and is not empty; use --force to write into it")
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FormatError(out, f"the folder cannot be made: {error.strerror}") from error
 
 
 def _starts(limb: list[LimbRun], goal: str) -> list[tuple[float, Array, Array]]:

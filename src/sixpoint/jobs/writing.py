@@ -33,6 +33,29 @@ def check_output(path: Path, suffixes: Sequence[str], force: bool, hint: str = "
     return files
 
 
+def prepare_folder(out: Path, force: bool, *, ours: bool = False) -> None:
+    """Make a folder to write several files into.
+
+    Args:
+        out: The folder.
+        force: It may hold other files.
+        ours: It is known to hold an earlier result, which may be gone on with.
+
+    Raises:
+        FormatError: It is a file, is not empty, or cannot be made.
+    """
+    if out.exists() and not out.is_dir():
+        raise FormatError(out, "this is a file; give a folder")
+    try:
+        if not force and not ours and out.exists() and any(out.iterdir()):
+            raise FormatError(
+                out, "exists and is not empty; choose another folder, or use --force to write into it"
+            )
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FormatError(out, f"the folder cannot be made: {error.strerror}") from error
+
+
 def keep_sources(files: Sequence[Path], sources: Sequence[Path | None]) -> None:
     """Refuse to write over what is read, even when overwriting is allowed: it could not be read again.
 

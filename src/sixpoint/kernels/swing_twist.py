@@ -3,12 +3,13 @@
 The limits of one joint are one row of a plain array, so that compiled functions pass a single array:
 
     axis 3 | forward 3 | side 3 | least swing limit, largest, cosine of half the least | twist 2
-    | K knots of theta | 4 (K - 1) cubic coefficients, highest power first, in (theta - knot)
+    | sines of half the twist 2 | K knots of theta | 4 (K - 1) cubic coefficients, highest power first, in
+    (theta - knot)
 
-The least swing limit lets most joints pass without evaluating the spline.
+The least swing limit and the sines let most joints pass without trigonometry.
 """
 
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, pi, sqrt
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 
-FORWARD, SIDE, SWING, TWIST, KNOTS = 3, 6, 9, 12, 14
+FORWARD, SIDE, SWING, TWIST, SINES, KNOTS = 3, 6, 9, 12, 14, 16
 TOLERANCE = 1e-12
 NEAR_ANTIPODE = pi / 6
 
@@ -45,9 +46,14 @@ def clamp(balls, b, q):
     """
     row = balls[b]
     axis = (row[0], row[1], row[2])
-    tau = qt.twist_angle(q, axis)
-    half = 0.5 * tau
-    s, c = sin(half), cos(half)
+    # Sine and cosine of half the twist, the twist in (-pi, pi]; of a half turn of swing it is zero.
+    s, c = q[0] * axis[0] + q[1] * axis[1] + q[2] * axis[2], q[3]
+    length = sqrt(s * s + c * c)
+    if length > 1e-150:
+        length = 1.0 / length if c >= 0.0 else -1.0 / length
+        s, c = s * length, c * length
+    else:
+        s, c = 0.0, 1.0
     twist = (s * axis[0], s * axis[1], s * axis[2], c)
     swing = qt.mul(q, (-twist[0], -twist[1], -twist[2], c))
     if swing[3] < 0.0:
@@ -70,9 +76,8 @@ def clamp(balls, b, q):
                 limit = -beyond if 2.0 * pi - psi - beyond < psi - limit else limit
             swing = qt.from_axis_angle(n, limit)
             changed = True
-    low, high = row[TWIST], row[TWIST + 1]
-    if tau < low - TOLERANCE or tau > high + TOLERANCE:
-        twist = qt.from_axis_angle(axis, min(max(tau, low), high))
+    if s < row[SINES] - TOLERANCE or s > row[SINES + 1] + TOLERANCE:
+        twist = qt.from_axis_angle(axis, row[TWIST] if s < 0.0 else row[TWIST + 1])
         changed = True
     if not changed:
         return q, False
@@ -90,11 +95,13 @@ def build_ball_rows(limits):
             row[:9] = np.eye(3).ravel()
             row[SWING : SWING + 3] = pi, pi, -1.0
             row[TWIST : TWIST + 2] = -2 * pi, 2 * pi
+            row[SINES : SINES + 2] = -2.0, 2.0
         else:
             pieces = len(limit.theta) - 1
             row[:9] = np.concatenate([limit.axis, limit.forward, limit.side])
             row[SWING : SWING + 3] = limit.psi.min(), limit.psi.max(), cos(0.5 * limit.psi.min())
             row[TWIST : TWIST + 2] = limit.twist
+            row[SINES : SINES + 2] = np.sin(0.5 * limit.twist)
             knots[: pieces + 1] = limit.theta
             cubics[:pieces] = limit.cubics
         row[KNOTS:] = np.concatenate([knots, cubics.ravel()])

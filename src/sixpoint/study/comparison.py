@@ -27,6 +27,7 @@ class Row:
         method: Name of the method.
         frames: Frames of the clip.
         rate: Frames per second [Hz].
+        key: Names what was measured: the files, frames and options of the clip, the method, and the code.
         weights: Weights of the pelvis estimate, as ``1,1,0``; empty for the method's own.
         error: Why there is no result; empty where there is one.
         failed_frames: Frames for which the method raised or gave numbers that are not finite.
@@ -64,6 +65,7 @@ class Row:
     method: str
     frames: int
     rate: float
+    key: str = ""
     weights: str = ""
     error: str = ""
     failed_frames: int = 0

@@ -26,21 +26,22 @@ Reference: Unzueta et al. 2008, section 9, of their prioritized IK.
 """
 
 
-def default_tasks(flext: bool = True) -> list[Task]:
+def default_tasks(flext: bool = True, tolerance: float | None = None) -> list[Task]:
     """Pelvis, then legs, arms and head, then the posture; in the order of ``EFFECTORS``.
 
     With FLEXT the legs flex at level 1 and take their direction at level 2, the arms at 4 and 5, and the rest
     of the body follows (levels 3 and 6) where a limb is too short; the head comes at level 7.
+    ``tolerance`` is that of every position [m].
     """
     if not flext:
         levels = {"head": 3, "l_wrist": 2, "r_wrist": 2, "l_ankle": 1, "r_ankle": 1}
-        limbs: list[Task] = [PositionTask(at, level=level) for at, level in levels.items()]
-        return [PositionTask("pelvis", level=0), *limbs, PostureTask(level=4)]
-    arms = [FlextTask(at, level=4, drag=True) for at in ("l_wrist", "r_wrist")]
-    legs = [FlextTask(at, level=1, drag=True) for at in ("l_ankle", "r_ankle")]
+        limbs: list[Task] = [PositionTask(at, level=k, tolerance=tolerance) for at, k in levels.items()]
+        return [PositionTask("pelvis", level=0, tolerance=tolerance), *limbs, PostureTask(level=4)]
+    arms = [FlextTask(at, level=4, drag=True, tolerance=tolerance) for at in ("l_wrist", "r_wrist")]
+    legs = [FlextTask(at, level=1, drag=True, tolerance=tolerance) for at in ("l_ankle", "r_ankle")]
     return [
-        PositionTask("pelvis", level=0),
-        PositionTask("head", level=7),
+        PositionTask("pelvis", level=0, tolerance=tolerance),
+        PositionTask("head", level=7, tolerance=tolerance),
         *arms,
         *legs,
         PostureTask(level=8),

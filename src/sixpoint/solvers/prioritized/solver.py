@@ -101,6 +101,7 @@ class PrioritizedIK:
         limits: bool = True,
         start: Literal["previous", "sequential"] = "previous",
         tasks: Sequence[Task] | None = None,
+        tolerance: float | None = None,
         **options: Any,
     ) -> PrioritizedIK:
         """A solver of the six points, with the default levels of ``full_body.default_tasks``.
@@ -112,11 +113,12 @@ class PrioritizedIK:
             start: Begin each frame from the frame before (the first from Sequential IK), or each from
                 Sequential IK.
             tasks: Other tasks, one goal each for the six effectors in their order.
+            tolerance: Error at which the default tasks stop iterating [m]; None for 1 mm.
             **options: Those of ``PrioritizedIK``.
         """
         if start not in ("previous", "sequential"):
             raise SixpointError(f"start is 'previous' or 'sequential', got {start!r}")
-        solver = cls(figure, tasks or default_tasks(flext), limits=limits, **options)
+        solver = cls(figure, tasks or default_tasks(flext, tolerance), limits=limits, **options)
         if len(solver.goal_names) != len(EFFECTORS):
             raise SixpointError(f"the six points need six tasks with a goal, got {len(solver.goal_names)}")
         solver._starter = SequentialIK(figure, limits=limits)

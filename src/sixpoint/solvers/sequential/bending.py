@@ -32,28 +32,36 @@ def plane_components(segs, v, flat):
 
 @helper
 def flat_chord(segments, flat, phi):
-    """Chord across v after turning by phi: length squared and half its derivative."""
+    """Chord across v after turning by phi: length squared and half its derivative.
+
+    The angles of the segments are in arithmetic progression (eq. 1), so two sines and cosines give all.
+    """
     x, y, dx, dy = 0.0, 0.0, 0.0, 0.0
+    first = segments[0, 3]
+    step = segments[1, 3] - first if flat.shape[0] > 1 else 0.0
+    c, s = cos(first * phi), sin(first * phi)
+    c_step, s_step = cos(step * phi), sin(step * phi)
     for k in range(flat.shape[0]):
         share = segments[k, 3]
-        c, s = cos(share * phi), sin(share * phi)
         px = c * flat[k, 0] - s * flat[k, 1]
         py = s * flat[k, 0] + c * flat[k, 1]
         x += px
         y += py
         dx -= share * py
         dy += share * px
+        c, s = c * c_step - s * s_step, s * c_step + c * s_step
     return x * x + y * y, x * dx + y * dy
 
 
 @helper
-def _refine(segments, flat, goal, inside, outside, along):
-    """Newton's method kept inside the bracket; f = chord squared minus goal."""
-    f_inside = flat_chord(segments, flat, inside)[0] - goal
+def _refine(segments, flat, goal, inside, f_inside, outside, squared, slope, along):
+    """Newton's method kept inside the bracket; f = chord squared minus goal.
+
+    ``squared`` and ``slope`` are of the angle ``outside``, where it begins.
+    """
     phi = outside
     tolerance = 2.0 * sqrt(max(goal + along * along, 1e-12)) * EXACT
     for _ in range(40):
-        squared, slope = flat_chord(segments, flat, phi)
         f = squared - goal
         if abs(f) < tolerance:
             break
@@ -63,6 +71,7 @@ def _refine(segments, flat, goal, inside, outside, along):
             outside = phi
         newton = phi - f / (2.0 * slope) if slope != 0.0 else outside
         phi = newton if (newton - inside) * (newton - outside) < 0.0 else 0.5 * (inside + outside)
+        squared, slope = flat_chord(segments, flat, phi)
     return phi
 
 
@@ -76,7 +85,8 @@ def search_angle(segments, flat, along, wanted, literal):
     Returns:
         phi [rad] and whether the length was met; if not, phi is the best found.
     """
-    squared = flat_chord(segments, flat, 0.0)[0]
+    squared, slope = flat_chord(segments, flat, 0.0)
+    inner = squared
     goal = wanted * wanted - along * along
     sign = 1.0 if squared > goal else -1.0
     length = sqrt(squared + along * along)
@@ -87,7 +97,8 @@ def search_angle(segments, flat, along, wanted, literal):
     while not passed and steps < COARSE_CAP:
         phi += step * COARSE
         steps += 1
-        squared = flat_chord(segments, flat, phi)[0]
+        inner = squared
+        squared, slope = flat_chord(segments, flat, phi)
         before, length = length, sqrt(squared + along * along)
         passed = sign * squared <= sign * goal
         gap = abs(length - wanted)
@@ -97,7 +108,7 @@ def search_angle(segments, flat, along, wanted, literal):
             best_phi, best_gap = phi, gap
         elif steps == 1 and not flipped:
             flipped, step, phi, steps = True, sign, 0.0, 0
-            length = before
+            length, squared = before, inner
         else:
             return best_phi, False
         if abs(length - before) < STALL and steps > 0:
@@ -112,4 +123,5 @@ def search_angle(segments, flat, along, wanted, literal):
             if sign * flat_chord(segments, flat, phi)[0] >= sign * goal:
                 break
         return phi, True
-    return _refine(segments, flat, goal, phi - step * COARSE, phi, along), True
+    inside = phi - step * COARSE
+    return _refine(segments, flat, goal, inside, inner - goal, phi, squared, slope, along), True

@@ -48,7 +48,7 @@ def solve_trunk(
     wanted = vec.norm(goal)
     # The trunk starts with the spine of the frame before and the pelvis as just estimated (Algorithm 1).
     qt.store(local, 0, qt.from_axes(x_estimated, y, vec.cross(x_estimated, y)))
-    v = spine.set_chord(
+    v, inside = spine.set_chord(
         segments,
         turns,
         chords,
@@ -65,7 +65,7 @@ def solve_trunk(
         vec.load(memory, 1),
     )
     vec.store(memory, 1, v)
-    if limits:  # line 15; it changes no rotation of the pelvis, so it may come before line 14
+    if limits and not inside:  # line 15; it changes no rotation of the pelvis, so it may come before line 14
         spine.clamp_interior(balls, segments.shape[0], local)
         spine.place_trunk(segments, local, world, segs)
     root = qt.load(local, 0)

@@ -73,11 +73,14 @@ def bending_axis(chord, wanted, local, world, plane):
 
 @helper
 def turn_trunk(segments, v, phi, world, segs):
-    """Turn every segment by its share of phi about v."""
+    """Turn every segment by its share of phi about v; the shares are in arithmetic progression."""
+    first = segments[0, 3]
+    q = qt.from_axis_angle(v, first * phi)
+    step = qt.from_axis_angle(v, (segments[1, 3] - first) * phi if world.shape[0] > 1 else 0.0)
     for k in range(world.shape[0]):
-        q = qt.from_axis_angle(v, segments[k, 3] * phi)
         qt.store(world, k, qt.mul(q, qt.load(world, k)))
         vec.store(segs, k, qt.mul_vec(q, vec.load(segs, k)))
+        q = qt.mul(q, step)
 
 
 @helper
@@ -194,16 +197,16 @@ def set_chord(
     bending plane's normal, zero if there is none.
 
     Returns:
-        The normal of the bending plane to remember.
+        The normal of the bending plane to remember, and whether the joints are within their limits for sure.
     """
     count = segments.shape[0]
     if count < 2:
         place_trunk(segments, local, world, segs)
-        return plane
+        return plane, True
     if wanted >= chords[0]:  # beyond the neutral chord
         stretch(turns, chords, wanted, local)
         place_trunk(segments, local, world, segs)
-        return plane
+        return plane, False
     place_trunk(segments, local, world, segs)
     if vec.norm(chord_of(segs)) > chords[0]:
         for k in range(1, count):
@@ -221,4 +224,5 @@ def set_chord(
         met = search_within_limits(segments, balls, v, wanted, start, world, segs, local)
     if not met and vec.norm(chord) < wanted:
         unbend(segments, wanted, start, world, segs, local)
-    return v
+        return v, False
+    return v, limits

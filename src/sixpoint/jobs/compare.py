@@ -1,0 +1,245 @@
+"""Compare methods on clips: a results file that an interrupted run continues, and a report made of it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import sixpoint
+from sixpoint.body.limits import Limits
+from sixpoint.errors import SixpointError
+from sixpoint.formats.atomic import write_files
+from sixpoint.jobs.compare_keys import digest, row_keys
+from sixpoint.jobs.compare_methods import Method
+from sixpoint.jobs.compare_report import write_report
+from sixpoint.jobs.compare_run import OpenClip, failed_row, load_run, open_clip, run_method, save_run
+from sixpoint.jobs.compare_study import Clip, Study
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.writing import prepare_folder
+from sixpoint.study.claims import check_claims
+from sixpoint.study.comparison import ClipRuns, Comparison, Row
+from sixpoint.study.results import is_results, rows_from_csv, rows_to_csv
+
+RESULTS, RUNS, DRAWN = "results.csv", "runs", "runs/report.key"
+REPORT = ("report.html", "report.md")
+LIMITATIONS = (
+    "Six positions do not tell the rotations of hands, feet and head, nor the pelvis' own yaw: all methods "
+    "share one estimate of the pelvis, and its error.",
+    "Methods are our own implementations with the presets above; where the papers are silent we chose, see "
+    "docs/methods.md.",
+    "Joint limits are those of the shipped table unless said otherwise; the truth itself leaves them, mostly "
+    "in trunk and neck.",
+    "Times are of one core of the machine named below; rows measured in another run may be of another hour. "
+    "Ratios say more than microseconds. A single call contains about 8 us of Python.",
+    "Foot skate is that of the ankles, which are targets: it shows what a method misses, not whether soles "
+    "slide.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What a comparison left behind.
+
+    Attributes:
+        rows: Of this study, one per method and clip.
+        measured: Rows that were measured now; the others were known.
+        files: The results file and the report.
+        drawn: Whether the report was made now.
+    """
+
+    rows: tuple[Row, ...]
+    measured: int
+    files: tuple[Path, ...]
+    drawn: bool
+
+
+def compare(
+    study: Study,
+    out: Path,
+    *,
+    limits_file: Path | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Compared:
+    """Run every method on every clip, and report.
+
+    A row that is known from an earlier run with the same files, options and code is not measured again. A
+    clip that cannot be read and a method that fails are rows with an error.
+
+    Args:
+        study: What to compare on what.
+        out: The folder to write into; it is made.
+        limits_file: A table of joint limits in place of the shipped one.
+        force: Begin again in a folder with results, or write into one that is not ours.
+        progress: Told how far the work is.
+
+    Raises:
+        SixpointError: The folder is not ours or holds results of another version, or nothing could be
+            measured.
+    """
+    limits = None if limits_file is None else Limits.load(limits_file)
+    known = _prepare_folder(out, force)
+    keys = row_keys(study, limits_file)
+    clips = _Clips(limits)
+    total, measured = len(study.clips) * len(study.methods), 0
+    progress("comparing", 0, total)
+    rows: list[Row] = []
+    for clip in study.clips:
+        for method in study.methods:
+            key = keys[clip.name, method.name]
+            row = known.get(key)
+            if row is None or not (row.error or (out / RUNS / f"{key}.npz").is_file()):
+                row = _measure(clips, clip, method, study.limits, key, out, progress)
+                known[key] = row
+                measured += 1
+                _write_rows(out, known)
+            rows.append(replace(row, clip=clip.name, method=method.name))
+            progress("comparing", len(rows), total)
+        clips.forget(clip)
+    if all(row.error for row in rows):
+        raise SixpointError(f"no method gave a result; {rows[0].clip}, {rows[0].method}: {rows[0].error}")
+    files = (out / RESULTS, *(out / name for name in REPORT))
+    stamp = digest(f"{study} {rows_to_csv(rows)}".encode())
+    if not measured and not force and all(f.is_file() for f in files) and _read(out / DRAWN) == stamp:
+        return Compared(tuple(rows), 0, files, False)
+    comparison = _gather(study, rows, clips, out, progress)
+    write_report(comparison, out, progress)
+    write_files({out / DRAWN: stamp.encode()}, force=True)
+    return Compared(tuple(rows), measured, files, True)
+
+
+class _Clips:
+    """Clips that are read when they are needed, one at a time."""
+
+    def __init__(self, limits: Limits | None) -> None:
+        self.limits = limits
+        self.open: dict[str, OpenClip | SixpointError] = {}
+
+    def get(self, clip: Clip) -> OpenClip | SixpointError:
+        if clip.name not in self.open:
+            try:
+                self.open[clip.name] = open_clip(clip, self.limits)
+            except SixpointError as error:
+                self.open[clip.name] = error
+        return self.open[clip.name]
+
+    def forget(self, clip: Clip) -> None:
+        self.open.pop(clip.name, None)
+
+
+def _measure(
+    clips: _Clips, clip: Clip, method: Method, limits: bool, key: str, out: Path, progress: Progress
+) -> Row:
+    opened = clips.get(clip)
+    if isinstance(opened, SixpointError):
+        return failed_row(clip, method, key, opened)
+    what, frames = f"{clip.name}: {method.name}", len(opened.truth)
+    progress(what, 0, frames)
+    row, run = run_method(opened, method, limits, key, _reporting(progress, what, frames))
+    progress(what, frames, frames)
+    if run is not None:
+        save_run(run, out / RUNS / f"{key}.npz")
+    return row
+
+
+def _reporting(progress: Progress, what: str, frames: int) -> Callable[[int], None]:
+    return lambda done: progress(what, done, frames)
+
+
+def _prepare_folder(out: Path, force: bool) -> dict[str, Row]:
+    """Make the folder; returns the rows of an earlier run by key."""
+    results = out / RESULTS
+    ours = is_results(results)
+    prepare_folder(out, force, ours=ours)
+    known = {} if force or not ours else {row.key: row for row in rows_from_csv(results)}
+    (out / RUNS).mkdir(exist_ok=True)
+    return known
+
+
+def _write_rows(out: Path, known: Mapping[str, Row]) -> None:
+    write_files({out / RESULTS: rows_to_csv(known.values()).encode()}, force=True)
+
+
+def _gather(study: Study, rows: Sequence[Row], clips: _Clips, out: Path, progress: Progress) -> Comparison:
+    """The comparison as the report wants it."""
+    drawn, notes = [], []
+    for number, clip in enumerate(study.clips):
+        progress("gathering", number, len(study.clips))
+        opened = clips.get(clip)
+        clips.forget(clip)
+        if clip.note:
+            notes.append(clip.note)
+        if isinstance(opened, SixpointError):
+            continue
+        runs = {
+            row.method: load_run(out / RUNS / f"{row.key}.npz", opened, row.method)
+            for row in rows
+            if row.clip == clip.name and not row.error
+        }
+        frames = len(opened.truth)
+        first, last = clip.window or (0, frames)
+        window = (min(max(first, 0), frames - 1), min(max(last, first + 1), frames))
+        truth = opened.truth.sliced(slice(opened.sample, opened.sample + 1))
+        drawn.append(
+            ClipRuns(
+                clip.name,
+                opened.figure,
+                opened.truth.rate,
+                opened.turning,
+                opened.sample,
+                window,
+                truth,
+                runs,
+            )
+        )
+    progress("gathering", len(study.clips), len(study.clips))
+    comparison = Comparison(
+        study.title,
+        tuple(method.name for method in study.methods),
+        tuple(rows),
+        tuple(drawn),
+        study.reference,
+        presets={method.name: method.preset for method in study.methods},
+        facts=_facts(study),
+        limitations=LIMITATIONS,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+    return replace(comparison, claims=check_claims(comparison, study.claims))
+
+
+def _facts(study: Study) -> tuple[tuple[str, str], ...]:
+    versions = [
+        f"{name} {importlib.metadata.version(name)}" for name in ("numpy", "numba", "scipy", "matplotlib")
+    ]
+    return (
+        ("machine", f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"),
+        (
+            "versions",
+            f"sixpoint {sixpoint.__version__}, Python {platform.python_version()}, {', '.join(versions)}",
+        ),
+        ("date", time.strftime("%Y-%m-%d")),
+        ("joint limits", "on" if study.limits else "off"),
+        ("clips", "; ".join(f"{clip.name}: {clip.file.name}" for clip in study.clips)),
+    )
+
+
+def _processor() -> str:
+    """Name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        name = platform.processor()
+    return name or "unknown processor"
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except OSError:
+        return ""

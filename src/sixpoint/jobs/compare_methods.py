@@ -1,0 +1,109 @@
+"""The methods of a comparison with their presets: fixed before anything is measured."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sixpoint.body.figure import Figure
+from sixpoint.errors import SixpointError, listed
+from sixpoint.solvers.base import Solver
+from sixpoint.solvers.jacobian.solver import DAMPING, REACH
+from sixpoint.solvers.registry import SOLVERS, find_solver
+
+STOP = "stops at 1 cm, at a gain below 1 mm, or after 20 iterations"
+PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
+    "sik": ({}, "closed form; the chord search is exact"),
+    "tgbsik": ({}, "weight of twist 1; swivel searched on the whole circle by 0.1, then 0.01 rad"),
+    "kma": ({}, f"from the standing pose; swivel angles zero; the spine's CCD {STOP}"),
+    "ccd": ({}, f"from tip to root; {STOP}"),
+    "jt": ({}, f"targets at most {REACH:g} m away; {STOP}"),
+    "pinv": ({}, f"targets at most {REACH:g} m away, singular values below 1 % dropped; {STOP}"),
+    "dls": ({}, f"damping {DAMPING:g} m, targets at most {REACH:g} m away; {STOP}"),
+    "dls-svd": ({}, f"damping {DAMPING:g} m, targets at most {REACH:g} m away; {STOP}"),
+    "sdls": ({}, f"largest turn 45 degrees, targets at most {REACH:g} m away; {STOP}"),
+    "pik": ({"tolerance": 0.01}, "levels pelvis, ankles, wrists, head, posture; stops at 1 cm or after 20"),
+    "pik-flext": ({"tolerance": 0.01}, "as pik, limbs by FLEXT in its secant form"),
+}
+"""Method -> options that differ from the solver's own, and the preset in words."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of a comparison.
+
+    Attributes:
+        name: What it is called in tables.
+        solver: Name of ``SOLVERS``, or ``module:Class``.
+        options: Its fixed options.
+        preset: The same in words.
+    """
+
+    name: str
+    solver: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    preset: str = ""
+
+    @classmethod
+    def named(cls, solver: str, name: str = "", options: Mapping[str, Any] | None = None) -> Method:
+        """A method by the name of its solver, with its preset and further options.
+
+        Raises:
+            SixpointError: There is no such solver, or it has no such option.
+        """
+        found = find_solver(solver)
+        usual, text = PRESETS.get(solver, ({}, "the user's own"))
+        if options:
+            text = ", ".join(f"{key} {value}" for key, value in options.items()) + f"; {text}"
+        method = cls(name or solver.rpartition(":")[2], solver, {**usual, **(options or {})}, text)
+        unknown = [key for key in method.options if key not in _keywords(found)]
+        if unknown and not _takes_more(found):
+            raise SixpointError(
+                f"the method {solver!r} has no option {listed(unknown)}; it has: {listed(_keywords(found))}"
+            )
+        return method
+
+    def make(self, figure: Figure, limits: bool, weights: tuple[float, float, float] | None) -> Solver:
+        """The solver of a figure; limits and weights are handed to solvers that know them."""
+        found = find_solver(self.solver)
+        known = _keywords(found)
+        options = dict(self.options)
+        if "limits" in known:
+            options["limits"] = limits
+        if weights is not None and "weights" in known:
+            options["weights"] = weights
+        return found(figure, **options)
+
+
+def _keywords(solver: Callable[..., Solver]) -> list[str]:
+    """Names of the options of a solver; the figure comes first and is none."""
+    parameters = list(inspect.signature(solver).parameters.values())[1:]
+    return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
+
+
+def _takes_more(solver: Callable[..., Solver]) -> bool:
+    """Whether a solver has options beside those it names."""
+    return any(p.kind is p.VAR_KEYWORD for p in inspect.signature(solver).parameters.values())
+
+
+METHODS = {name: Method.named(name) for name in SOLVERS}
+"""All methods of ours by name."""
+
+
+def choose_methods(text: str) -> tuple[Method, ...]:
+    """Methods as ``sik,kma,my_module:MySolver``; ``all`` are ours.
+
+    Raises:
+        SixpointError: A method does not exist; the message lists those there are.
+    """
+    chosen: dict[str, Method] = {}
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        for method in METHODS.values() if word == "all" else [Method.named(word)]:
+            if method.name in chosen and chosen[method.name] != method:
+                method = Method.named(method.solver, method.solver)
+            chosen[method.name] = method
+    if not chosen:
+        raise SixpointError(f"no methods; there are: {listed(SOLVERS)}, or module:Class for your own")
+    return tuple(chosen.values())

@@ -1,0 +1,1 @@
+"""Studies that ship with sixpoint, as TOML: ``sixpoint compare --study NAME``."""
