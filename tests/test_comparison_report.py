@@ -15,16 +15,14 @@ from scipy import stats
 
 from sixpoint.body.figure import Figure
 from sixpoint.errors import FormatError
-from sixpoint.jobs.compare_report import build_document, write_report
+from sixpoint.jobs.compare.report import build_document, write_report
 from sixpoint.samples import make_sample
-from sixpoint.study import comparison_averages as averages
-from sixpoint.study import comparison_measures as measures
-from sixpoint.study import comparison_tables as tables
-from sixpoint.study.comparison import Claim, ClipRuns, Comparison, Reference, Row, Run
-from sixpoint.study.comparison_plots import draw_errors, encode, find_turns, has_window
-from sixpoint.study.comparison_poses import draw_poses
-from sixpoint.study.comparison_summary import summarise
-from sixpoint.study.comparison_trade import draw_trade, find_marks
+from sixpoint.study.comparison import averages, measures, tables
+from sixpoint.study.comparison.curves import draw_errors, encode, find_turns, has_window
+from sixpoint.study.comparison.model import Claim, ClipRuns, Comparison, Reference, Row, Run
+from sixpoint.study.comparison.poses import draw_poses
+from sixpoint.study.comparison.summary import summarise
+from sixpoint.study.comparison.trade import draw_trade, find_marks
 from sixpoint.study.document import (
     BEST,
     NEXT,
@@ -543,7 +541,7 @@ def test_nothing_is_replaced_before_all_is_drawn(comparison, tmp_path, monkeypat
     def broken(*args, **kwargs):
         raise RuntimeError("no ink")
 
-    monkeypatch.setattr("sixpoint.study.comparison_poses._draw_cell", broken)
+    monkeypatch.setattr("sixpoint.study.comparison.poses._draw_cell", broken)
     with pytest.raises(RuntimeError, match="no ink"):
         write_report(comparison, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]

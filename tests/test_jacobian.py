@@ -233,7 +233,8 @@ def test_the_transpose_step_is_an_exact_line_search(seed, real):
     np.testing.assert_allclose(dq, length * gradient, atol=1e-12 * np.abs(dq).max())
     moved = jacobian @ gradient
     best = minimize_scalar(lambda a: np.sum((e - a * moved) ** 2), method="brent", tol=1e-12).x
-    assert length == pytest.approx(best, rel=1e-6)
+    assert length == pytest.approx(best, rel=1e-4)  # as flat as it is, the minimum is not sharper
+    assert moved @ (e - length * moved) == pytest.approx(0.0, abs=1e-9 * np.abs(moved @ e))
     capped = step_of("transpose", jacobian, e)
     for step in (dq, capped):
         assert np.linalg.norm(e - jacobian @ step) < np.linalg.norm(e)

@@ -9,8 +9,8 @@ import pytest
 
 from sixpoint.cli import main
 from sixpoint.errors import FormatError
-from sixpoint.jobs.study_flext import PICTURES, REPORT, FlextStudy, study_flext
-from sixpoint.jobs.study_flext_limb import ITERATIONS
+from sixpoint.jobs.flext_study.job import PICTURES, REPORT, FlextStudy, study_flext
+from sixpoint.jobs.flext_study.limb import ITERATIONS
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_folder_that_is_not_empty_is_refused(study, folder):
 
 def test_command(study, tmp_path, monkeypatch, capsys):
     """The command prints the tables and where the files are; mistakes are one line."""
-    monkeypatch.setattr("sixpoint.jobs.study_flext.study_flext", lambda out, **_: study)
+    monkeypatch.setattr("sixpoint.jobs.flext_study.job.study_flext", lambda out, **_: study)
     monkeypatch.chdir(tmp_path)
     assert main(["study", "flext"]) == 0
     out, err = capsys.readouterr()

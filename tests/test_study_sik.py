@@ -15,11 +15,11 @@ from independent import world_matrices
 from sixpoint import Figure, Limits, Motion, SequentialIK, make_sample
 from sixpoint.cli import main
 from sixpoint.errors import FormatError
-from sixpoint.jobs.study_sik import PICTURES, REPORT, SikStudy, study_sik
-from sixpoint.jobs.study_sik_clips import CLIPS, find_recording, run_clip
-from sixpoint.study import sik_limits
-from sixpoint.study.sik_hierarchy import _lay_out
-from sixpoint.study.sik_samples import choose_samples
+from sixpoint.jobs.sik_study.clips import CLIPS, find_recording, run_clip
+from sixpoint.jobs.sik_study.job import PICTURES, REPORT, SikStudy, study_sik
+from sixpoint.study.sik_figures import limits as sik_limits
+from sixpoint.study.sik_figures.hierarchy import _lay_out
+from sixpoint.study.sik_figures.samples import choose_samples
 
 
 @pytest.fixture(scope="module")
@@ -273,7 +273,7 @@ def test_command(study, tmp_path, monkeypatch, capsys):
     """The command prints the tables and where the files are; mistakes are one line."""
     asked = []
     monkeypatch.setattr(
-        "sixpoint.jobs.study_sik.study_sik", lambda out, **options: asked.append((out, options)) or study
+        "sixpoint.jobs.sik_study.job.study_sik", lambda out, **options: asked.append((out, options)) or study
     )
     monkeypatch.chdir(tmp_path)
     assert main(["study", "sik"]) == 0

@@ -15,8 +15,8 @@ from sixpoint.errors import SixpointError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sixpoint.jobs.compare_study import Study
-    from sixpoint.study.comparison import Row
+    from sixpoint.jobs.compare.study import Study
+    from sixpoint.study.comparison.model import Row
 
 COLUMNS = ("method", "position", "rad", "missed", "farthest cm", "us/frame", "single us", "jerk", "jumps")
 LEGEND = (
@@ -68,7 +68,7 @@ def compare(
     sixpoint compare walk.bvh --methods all,my_module:MySolver
     ```
     """
-    from sixpoint.jobs.compare import compare as run
+    from sixpoint.jobs.compare.job import compare as run
 
     chosen = _study(list(clips), study, data, methods, frames, weights, mapping, no_limits)
     screen = Screen()
@@ -108,8 +108,8 @@ def _study(
     """The study that the command line asks for."""
     from dataclasses import replace
 
-    from sixpoint.jobs.compare_methods import choose_methods
-    from sixpoint.jobs.compare_study import find_study, read_study, study_of_files
+    from sixpoint.jobs.compare.methods import choose_methods
+    from sixpoint.jobs.compare.study import find_study, read_study, study_of_files
     from sixpoint.jobs.reading import parse_frames
     from sixpoint.jobs.solving import parse_weights
 

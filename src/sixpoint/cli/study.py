@@ -31,8 +31,8 @@ def flext(
     sixpoint study flext --out /tmp/flext --force
     ```
     """
-    from sixpoint.jobs.study_flext import study_flext
-    from sixpoint.jobs.study_flext_report import BODY_COLUMNS, LIMB_COLUMNS, body_rows, limb_rows
+    from sixpoint.jobs.flext_study.job import study_flext
+    from sixpoint.jobs.flext_study.report import BODY_COLUMNS, LIMB_COLUMNS, body_rows, limb_rows
 
     screen = Screen()
     with screen.progress() as progress:
@@ -77,8 +77,8 @@ def sik(
     sixpoint study sik --data data/cmu --out /tmp/sik --force
     ```
     """
-    from sixpoint.jobs.study_sik import study_sik
-    from sixpoint.jobs.study_sik_report import CLIP_COLUMNS, clip_rows, spine_columns, spine_rows
+    from sixpoint.jobs.sik_study.job import study_sik
+    from sixpoint.jobs.sik_study.report import CLIP_COLUMNS, clip_rows, spine_columns, spine_rows
 
     screen = Screen()
     with screen.progress() as progress:

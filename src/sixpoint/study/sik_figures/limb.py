@@ -17,7 +17,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.study.canvas import DPI, INK, RIGHT, WIDTH, add_heading, add_legend, save_canvas
 from sixpoint.study.plots import _parts
-from sixpoint.study.sik_plots import (
+from sixpoint.study.sik_figures.spine import (
     BESIDE,
     PALE,
     add_stage,

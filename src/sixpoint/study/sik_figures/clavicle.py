@@ -17,7 +17,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.study.canvas import DPI, INK, LEFT, WIDTH, add_heading, add_legend, save_canvas
 from sixpoint.study.plots import _parts
-from sixpoint.study.sik_plots import (
+from sixpoint.study.sik_figures.spine import (
     PALE,
     add_stage,
     arm_parts,

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.study.canvas import DPI, GHOST, INK, LEFT, RIGHT, SOFT, TRUNK, WIDTH, add_heading, add_legend
-from sixpoint.study.comparison import ClipRuns, Run
-from sixpoint.study.comparison_plots import plain
+from sixpoint.study.comparison.curves import plain
+from sixpoint.study.comparison.model import ClipRuns, Run
 from sixpoint.study.plots import VIEW_YAW, _camera, _draw_body, _outline, _Part, _parts
 
 Array = NDArray[np.float64]

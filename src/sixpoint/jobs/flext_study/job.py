@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.formats.atomic import write_files
-from sixpoint.jobs.progress import Progress, silent
-from sixpoint.jobs.reconstruct import STATURE
-from sixpoint.jobs.study_flext_body import (
+from sixpoint.jobs.flext_study.body import (
     FREE_METHODS,
     REACH_METHODS,
     BodyRun,
@@ -21,7 +19,9 @@ from sixpoint.jobs.study_flext_body import (
     reach,
     squat_and_kick,
 )
-from sixpoint.jobs.study_flext_limb import BENDS, GOALS, METHODS, LimbRun, flex_all, hand_angle, postures
+from sixpoint.jobs.flext_study.limb import BENDS, GOALS, METHODS, LimbRun, flex_all, hand_angle, postures
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.reconstruct import STATURE
 from sixpoint.jobs.writing import prepare_folder
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def study_flext(out: Path, *, force: bool = False, progress: Progress = silent) 
 
     Reference: Boulic and Raunhardt 2009, section 6, Figure 4.
     """
-    from sixpoint.jobs.study_flext_report import report
+    from sixpoint.jobs.flext_study.report import report
 
     # Matplotlib is slow to import
     from sixpoint.study.flext_plots import draw_convergence, draw_kick, draw_postures, draw_reach

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import degrees, isfinite, isnan, nan
 
-from sixpoint.study.comparison import Comparison, Row
-from sixpoint.study.comparison_averages import (
+from sixpoint.study.comparison.averages import (
     average,
     averaged_clips,
     baseline,
@@ -20,6 +19,7 @@ from sixpoint.study.comparison_averages import (
     published,
     published_average,
 )
+from sixpoint.study.comparison.model import Comparison, Row
 from sixpoint.study.document import Table
 
 NONE, OURS, THEIRS, ALL = "–", "ours", "reference", "Over all clips"

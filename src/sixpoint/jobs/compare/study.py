@@ -12,9 +12,9 @@ from typing import Any
 from sixpoint.body.tables import read_table
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES
-from sixpoint.jobs.compare_methods import METHODS, Method
+from sixpoint.jobs.compare.methods import METHODS, Method
 from sixpoint.jobs.reading import parse_frames
-from sixpoint.study.comparison import Reference
+from sixpoint.study.comparison.model import Reference
 
 MOTIONS = tuple(suffix for suffix in MOTION_SUFFIXES if suffix != ".asf")
 TOO_MANY = 500  # files of a folder: more were hardly meant

@@ -16,7 +16,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import SwingTwist
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
-from sixpoint.jobs.study_sik_cases import BY_THE_FEET, LEFT, RIGHT, distance, neutral_points, swing_of
+from sixpoint.jobs.sik_study.trunk import BY_THE_FEET, LEFT, RIGHT, distance, neutral_points, swing_of
 from sixpoint.solvers.sequential.solver import SequentialIK
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sixpoint.jobs.study_flext_body import BodyRun, acceleration
-from sixpoint.jobs.study_flext_limb import BENDS, DRAWN, GAIN, GOALS, METHODS, LimbRun
+from sixpoint.jobs.flext_study.body import BodyRun, acceleration
+from sixpoint.jobs.flext_study.limb import BENDS, DRAWN, GAIN, GOALS, METHODS, LimbRun
 
 if TYPE_CHECKING:
-    from sixpoint.jobs.study_flext import FlextStudy
+    from sixpoint.jobs.flext_study.job import FlextStudy
 
 SHOWN = (1, 2, 3, 6, 12)
 """Iterations of the table."""

@@ -11,9 +11,9 @@ from sixpoint.body.figure import Figure
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
-from sixpoint.jobs.study_sik_cases import ClavicleCase, SpineCase, bend_spine, reach_beyond
-from sixpoint.jobs.study_sik_clips import CLIPS, ClipRun, find_recording, run_clip
-from sixpoint.jobs.study_sik_limb import LimbCase, LimitCase, stop_arm, swivel_arm
+from sixpoint.jobs.sik_study.clips import CLIPS, ClipRun, find_recording, run_clip
+from sixpoint.jobs.sik_study.limb import LimbCase, LimitCase, stop_arm, swivel_arm
+from sixpoint.jobs.sik_study.trunk import ClavicleCase, SpineCase, bend_spine, reach_beyond
 from sixpoint.jobs.writing import prepare_folder
 from sixpoint.solvers.sequential.solver import SequentialIK
 
@@ -72,7 +72,7 @@ def study_sik(
 
     Reference: Unzueta et al. 2008, Figures 2, 4 to 7 and 10 to 13.
     """
-    from sixpoint.jobs.study_sik_report import report
+    from sixpoint.jobs.sik_study.report import report
 
     sources = [find_recording(data, clip) for clip in CLIPS]
     prepare_folder(out, force)
@@ -103,11 +103,11 @@ def _draw_cases(
     figure: Figure, spine: SpineCase, clavicle: ClavicleCase, limb: LimbCase, limits: LimitCase, out: Path
 ) -> None:
     # Matplotlib is slow to import
-    from sixpoint.study.sik_clavicle import draw_clavicle
-    from sixpoint.study.sik_hierarchy import draw_hierarchy
-    from sixpoint.study.sik_limb import draw_limb
-    from sixpoint.study.sik_limits import draw_limits
-    from sixpoint.study.sik_plots import draw_spine
+    from sixpoint.study.sik_figures.clavicle import draw_clavicle
+    from sixpoint.study.sik_figures.hierarchy import draw_hierarchy
+    from sixpoint.study.sik_figures.limb import draw_limb
+    from sixpoint.study.sik_figures.limits import draw_limits
+    from sixpoint.study.sik_figures.spine import draw_spine
 
     draw_spine(
         figure,

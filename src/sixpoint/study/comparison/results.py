@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sixpoint.errors import FormatError
-from sixpoint.study.comparison import Row
+from sixpoint.study.comparison.model import Row
 
 VERSION = 1
 """Of the columns; a file of another version is not read."""

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
-from sixpoint.study.comparison import Comparison
-from sixpoint.study.comparison_averages import (
+from sixpoint.study.comparison.averages import (
     average,
     averaged_clips,
     clip_names,
@@ -22,7 +21,8 @@ from sixpoint.study.comparison_averages import (
     published,
     published_average,
 )
-from sixpoint.study.comparison_measures import OURS, THEIRS, describe_missing, number
+from sixpoint.study.comparison.measures import OURS, THEIRS, describe_missing, number
+from sixpoint.study.comparison.model import Comparison
 from sixpoint.study.document import BAD, BEST, GOOD, NEXT, Table
 
 ROUNDING = 1.1e-4  # of a mean of three numbers of four digits, and of the printed mean

@@ -30,7 +30,7 @@ from sixpoint.study.canvas import (
     style_axes,
 )
 from sixpoint.study.plots import _parts
-from sixpoint.study.sik_plots import (
+from sixpoint.study.sik_figures.spine import (
     PALE,
     add_stage,
     arm_parts,

@@ -18,11 +18,11 @@ from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
-from sixpoint.jobs.compare_methods import Method
-from sixpoint.jobs.compare_study import Clip
+from sixpoint.jobs.compare.methods import Method
+from sixpoint.jobs.compare.study import Clip
 from sixpoint.jobs.reading import ALL, Reading, open_motion, parse_frames
 from sixpoint.solvers.base import Solution, Solver
-from sixpoint.study.comparison import Row, Run
+from sixpoint.study.comparison.model import Row, Run
 from sixpoint.study.metrics import Errors, compute_errors
 from sixpoint.study.movement import compute_local_rotations, compute_turning
 from sixpoint.study.quality import measure_quality

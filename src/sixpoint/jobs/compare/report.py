@@ -17,7 +17,7 @@ from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from sixpoint.study.comparison import ClipRuns, Comparison
+    from sixpoint.study.comparison.model import ClipRuns, Comparison
     from sixpoint.study.document import Block, Document, Picture
 
 PAGE, TEXT, PICTURES = "report.html", "report.md", "pictures"
@@ -75,8 +75,8 @@ def write_report(comparison: Comparison, folder: Path, progress: Progress = sile
 
 def build_document(comparison: Comparison, progress: Progress = silent) -> Document:
     """Everything the report says and shows; told of every picture."""
-    from sixpoint.study.comparison_plots import has_window
-    from sixpoint.study.comparison_summary import summarise
+    from sixpoint.study.comparison.curves import has_window
+    from sixpoint.study.comparison.summary import summarise
     from sixpoint.study.document import Bullets, Document, Heading, Picture
 
     total = 1 + sum(2 + has_window(clip) for clip in comparison.clips)
@@ -94,11 +94,10 @@ def build_document(comparison: Comparison, progress: Progress = silent) -> Docum
 
 def _results(comparison: Comparison) -> Iterator[Block]:
     """Statements, errors, times and qualities over all clips, failures."""
-    from sixpoint.study import comparison_measures as measures
-    from sixpoint.study import comparison_tables as tables
-    from sixpoint.study.comparison_averages import QUANTITIES, averaged_clips
-    from sixpoint.study.comparison_plots import encode
-    from sixpoint.study.comparison_trade import draw_trade
+    from sixpoint.study.comparison import measures, tables
+    from sixpoint.study.comparison.averages import QUANTITIES, averaged_clips
+    from sixpoint.study.comparison.curves import encode
+    from sixpoint.study.comparison.trade import draw_trade
     from sixpoint.study.document import Heading, Picture
 
     if comparison.claims:
@@ -125,9 +124,9 @@ def _results(comparison: Comparison) -> Iterator[Block]:
 
 def _clips(comparison: Comparison) -> Iterator[Block]:
     """Pictures and tables of every clip."""
-    from sixpoint.study import comparison_measures as measures
-    from sixpoint.study.comparison_averages import clip_names
-    from sixpoint.study.comparison_summary import describe_clip
+    from sixpoint.study.comparison import measures
+    from sixpoint.study.comparison.averages import clip_names
+    from sixpoint.study.comparison.summary import describe_clip
     from sixpoint.study.document import Heading
 
     drawn = {clip.name: clip for clip in comparison.clips}
@@ -144,9 +143,9 @@ def _clips(comparison: Comparison) -> Iterator[Block]:
 
 
 def _pictures(comparison: Comparison, clip: ClipRuns, name: str) -> Iterator[Picture]:
-    from sixpoint.study.comparison_averages import baseline, explain_missing
-    from sixpoint.study.comparison_plots import draw_errors, encode, has_window
-    from sixpoint.study.comparison_poses import draw_poses
+    from sixpoint.study.comparison.averages import baseline, explain_missing
+    from sixpoint.study.comparison.curves import draw_errors, encode, has_window
+    from sixpoint.study.comparison.poses import draw_poses
     from sixpoint.study.document import Picture
 
     methods, base = comparison.methods, baseline(comparison)
@@ -174,7 +173,7 @@ def _file_name(clip: str, used: set[str]) -> str:
 
 def _background(comparison: Comparison) -> Iterator[Block]:
     """What the methods are, what errors mean, on what it was measured, and what to keep in mind."""
-    from sixpoint.study.comparison_tables import pair_table
+    from sixpoint.study.comparison.tables import pair_table
     from sixpoint.study.document import Bullets, Heading, Paragraph
 
     if comparison.presets:

@@ -6,8 +6,7 @@ from math import isfinite, isnan
 
 import numpy as np
 
-from sixpoint.study.comparison import ClipRuns, Comparison
-from sixpoint.study.comparison_averages import (
+from sixpoint.study.comparison.averages import (
     QUANTITIES,
     average,
     averaged_clips,
@@ -18,7 +17,8 @@ from sixpoint.study.comparison_averages import (
     list_names,
     published_average,
 )
-from sixpoint.study.comparison_plots import TURN, find_turns
+from sixpoint.study.comparison.curves import TURN, find_turns
+from sixpoint.study.comparison.model import ClipRuns, Comparison
 from sixpoint.study.document import Paragraph
 
 UNITS = {"position": "", "orientation": " rad"}

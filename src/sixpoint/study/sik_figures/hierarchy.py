@@ -26,7 +26,7 @@ from sixpoint.study.canvas import (
     save_canvas,
 )
 from sixpoint.study.plots import _outline, _parts
-from sixpoint.study.sik_plots import PALE, add_stage, camera, draw_parts
+from sixpoint.study.sik_figures.spine import PALE, add_stage, camera, draw_parts
 
 Array = NDArray[np.float64]
 

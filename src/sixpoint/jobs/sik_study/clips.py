@@ -146,7 +146,7 @@ def run_clip(clip: Clip, source: tuple[Path, int] | None, figure: Figure, out: P
     """
     # Matplotlib is slow to import
     from sixpoint.study.plots import compute_distances
-    from sixpoint.study.sik_samples import choose_samples, draw_samples
+    from sixpoint.study.sik_figures.samples import choose_samples, draw_samples
 
     truth = make_sample(clip.sample, figure)
     if source is not None:

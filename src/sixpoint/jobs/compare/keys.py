@@ -10,7 +10,7 @@ import importlib
 from pathlib import Path
 
 import sixpoint
-from sixpoint.jobs.compare_study import Study
+from sixpoint.jobs.compare.study import Study
 
 MEASURED_BY = (
     "kernels",
@@ -21,7 +21,7 @@ MEASURED_BY = (
     "study/metrics.py",
     "study/quality.py",
     "study/movement.py",
-    "jobs/compare_run.py",
+    "jobs/compare/run.py",
 )
 """What of our code decides a row."""
 

@@ -14,16 +14,16 @@ import sixpoint
 from sixpoint.body.limits import Limits
 from sixpoint.errors import SixpointError
 from sixpoint.formats.atomic import write_files
-from sixpoint.jobs.compare_keys import digest, row_keys
-from sixpoint.jobs.compare_methods import Method
-from sixpoint.jobs.compare_report import write_report
-from sixpoint.jobs.compare_run import OpenClip, failed_row, load_run, open_clip, run_method, save_run
-from sixpoint.jobs.compare_study import Clip, Study
+from sixpoint.jobs.compare.keys import digest, row_keys
+from sixpoint.jobs.compare.methods import Method
+from sixpoint.jobs.compare.report import write_report
+from sixpoint.jobs.compare.run import OpenClip, failed_row, load_run, open_clip, run_method, save_run
+from sixpoint.jobs.compare.study import Clip, Study
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.writing import prepare_folder
-from sixpoint.study.claims import check_claims
-from sixpoint.study.comparison import ClipRuns, Comparison, Row
-from sixpoint.study.results import is_results, rows_from_csv, rows_to_csv
+from sixpoint.study.comparison.claims import check_claims
+from sixpoint.study.comparison.model import ClipRuns, Comparison, Row
+from sixpoint.study.comparison.results import is_results, rows_from_csv, rows_to_csv
 
 RESULTS, RUNS, DRAWN = "results.csv", "runs", "runs/report.key"
 REPORT = ("report.html", "report.md")

@@ -17,8 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from sixpoint.study.canvas import DPI, INK, SOFT, WIDTH, add_heading, add_legend, style_axes
-from sixpoint.study.comparison import Comparison
-from sixpoint.study.comparison_averages import (
+from sixpoint.study.comparison.averages import (
     average,
     averaged_clips,
     baseline,
@@ -26,7 +25,8 @@ from sixpoint.study.comparison_averages import (
     list_names,
     published_average,
 )
-from sixpoint.study.comparison_plots import colour_methods, plain
+from sixpoint.study.comparison.curves import colour_methods, plain
+from sixpoint.study.comparison.model import Comparison
 
 Array = NDArray[np.float64]
 

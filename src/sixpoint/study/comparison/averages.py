@@ -13,7 +13,7 @@ from math import isfinite, nan
 import numpy as np
 from scipy.stats import spearmanr
 
-from sixpoint.study.comparison import Comparison, Row
+from sixpoint.study.comparison.model import Comparison, Row
 
 AVERAGE = "average"
 """The clip of a ``Reference`` that is its printed average."""

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sixpoint.errors import listed
-from sixpoint.jobs.study_sik_limb import SWIVELS
+from sixpoint.jobs.sik_study.limb import SWIVELS
 
 if TYPE_CHECKING:
-    from sixpoint.jobs.study_sik import SikStudy
-    from sixpoint.jobs.study_sik_cases import SpineCase
-    from sixpoint.jobs.study_sik_clips import ClipRun
+    from sixpoint.jobs.sik_study.clips import ClipRun
+    from sixpoint.jobs.sik_study.job import SikStudy
+    from sixpoint.jobs.sik_study.trunk import SpineCase
 
 EXACT, EVEN = 1e-6, 1e-4
 """A distance that is met [m]; turns that are the same [rad]."""
@@ -169,7 +169,7 @@ def _limb(study: SikStudy) -> list[str]:
 
 
 def _limits(study: SikStudy) -> list[str]:
-    from sixpoint.study.sik_limits import compute_overshoot  # Matplotlib is slow to import
+    from sixpoint.study.sik_figures.limits import compute_overshoot  # Matplotlib is slow to import
 
     case = study.limits
     knots = np.degrees(np.column_stack([case.shoulder.theta, case.shoulder.psi, case.hip.psi]))

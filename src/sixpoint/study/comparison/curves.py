@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from sixpoint.study.canvas import DPI, INK, SERIES, SOFT, WIDTH, add_heading, add_legend, style_axes
-from sixpoint.study.comparison import ClipRuns
+from sixpoint.study.comparison.model import ClipRuns
 
 Array = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from sixpoint.study.canvas import (
 )
 from sixpoint.study.metrics import measured_joints
 from sixpoint.study.plots import VIEW_YAW, _camera, _outline, _Part, _parts, compute_distances
-from sixpoint.study.sik_plots import add_stage, draw_parts, tint
+from sixpoint.study.sik_figures.spine import add_stage, draw_parts, tint
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from sixpoint.study.comparison import Claim, ClipRuns, Comparison
+from sixpoint.study.comparison.model import Claim, ClipRuns, Comparison
 
 JACOBIAN = ("pinv", "dls", "dls-svd", "sdls")
 PEAK = 0.02  # share of frames with the largest errors that are called peaks
@@ -179,8 +179,8 @@ def _peaks_at_turns(c: Comparison) -> Iterator[Claim]:
         yield Claim(
             f"Errors peak at quick turn-arounds: {clip.name}, frames {first} to {last} (Figures 16 to 18).",
             f"Of the 2 % of frames with the largest mean error of all methods, frame "
-            f"{first + peaks.min()} and {len(peaks) - 1} more, {100 * at:.0f} % are within a quarter of a second "
-            f"of the true pelvis turning faster than 2 rad/s; of all frames {100 * usual:.0f} %.",
+            f"{first + peaks.min()} and {len(peaks) - 1} more, {100 * at:.0f} % are within a quarter of a "
+            f"second of the true pelvis turning faster than 2 rad/s; of all frames {100 * usual:.0f} %.",
             at > 0.5 and at > 1.2 * usual,
         )
 

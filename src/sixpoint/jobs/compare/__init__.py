@@ -1,0 +1,1 @@
+"""``sixpoint compare``: methods on clips, a results file, a report."""

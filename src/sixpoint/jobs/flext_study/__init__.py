@@ -1,0 +1,1 @@
+"""``sixpoint study flext``: the experiments of Boulic and Raunhardt 2009."""

@@ -1,0 +1,1 @@
+"""``sixpoint study sik``: the figures of Unzueta et al. 2008."""

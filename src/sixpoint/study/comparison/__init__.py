@@ -1,0 +1,1 @@
+"""Comparisons of methods: what they hold, tables, curves, poses, statements tested."""
