@@ -10,15 +10,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.jacobian import steps
 from sixpoint.solvers.jacobian.frame import LONG_ROWS, SMALL_ROWS, M, solve_jacobian
+from sixpoint.solvers.relaxed import ELBOW, HIP, KNEE, SHOULDER_BACK, SHOULDER_OUT
 from sixpoint.solvers.six_points.packing import Model
 from sixpoint.solvers.six_points.solver import WALKING, TreeSolver
 from sixpoint.solvers.six_points.tree import BALL, Tree
 
 Array = NDArray[np.float64]
+
+X, Z = np.eye(3)[[0, 2]]
 
 RULES = {
     "transpose": steps.TRANSPOSE,
@@ -72,6 +76,17 @@ class JacobianIK(TreeSolver):
             )
         self.step, self.damping, self.reach, self.solve_root = step, float(damping), float(reach), solve_root
         super().__init__(figure, weights=weights, limits=limits)
+        self._relax()
+
+    def _relax(self) -> None:
+        """Start with slightly bent limbs: a straight one is singular, and a hinge's limit may hold it."""
+        first = self._trunk + 2
+        for k, side in enumerate((1.0, -1.0)):
+            shoulder, elbow, hip, knee = (first + 2 * n + k for n in range(4))
+            out, back = rot.from_axis_angle(Z, side * SHOULDER_OUT), rot.from_axis_angle(X, SHOULDER_BACK)
+            self._start[shoulder] = rot.mul(out, back)
+            self._start[elbow] = rot.from_axis_angle(X, -ELBOW)
+            self._start[hip], self._start[knee] = (rot.from_axis_angle(X, a) for a in (-HIP, KNEE))
 
     def _numbers(self) -> tuple[float, ...]:
         return (RULES[self.step], self.damping, self.reach)

@@ -14,16 +14,11 @@ from sixpoint.errors import SixpointError
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.goals import FAR
 from sixpoint.solvers.prioritized.tasks import FlextTask, PositionTask, PostureTask, Task
+from sixpoint.solvers.relaxed import ELBOW, HIP, KNEE, SHOULDER_BACK, SHOULDER_OUT
 
 Array = NDArray[np.float64]
 
 X, Z = np.eye(3)[[0, 2]]
-
-ELBOW, SHOULDER_BACK, SHOULDER_OUT, KNEE, HIP = np.radians([20.0, 10.0, 10.0, 15.0, 8.0])
-"""Relaxed standing: "elbows slightly bent and backward, knees slightly bent and forward".
-
-Reference: Unzueta et al. 2008, section 9, of their prioritized IK.
-"""
 
 
 def default_tasks(flext: bool = True, tolerance: float | None = None) -> list[Task]:
