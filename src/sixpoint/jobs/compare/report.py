@@ -108,7 +108,7 @@ def _results(comparison: Comparison) -> Iterator[Block]:
         yield tables.error_table(comparison, quantity)
     canvas = draw_trade(comparison)
     if canvas is not None:
-        caption = "Position error against the median time of a frame, both logarithmic; lower left is better."
+        caption = "Position error against the time of a frame, both logarithmic; lower left is better."
         yield Picture("error-against-time.png", encode(canvas), caption)
     if len(averaged_clips(comparison)) > 1:
         yield measures.reading_table(comparison)

@@ -186,9 +186,8 @@ def time_table(comparison: Comparison, clip: str | None = None) -> Table:
     """Times of one clip or over the averaged ones, and as ratios to the baseline, which machines share."""
     base = baseline(comparison)
     columns = ["method", *(measure.head for measure in TIMES), OURS]
-    groups = ["", *(measure.group for measure in TIMES), f"median / {base}"]
-    median = TIMES[1]
-    ours = [_value(comparison, median, clip, method) for method in comparison.methods]
+    groups = ["", *(measure.group for measure in TIMES), f"time / {base}"]
+    ours = [_value(comparison, TIMES[0], clip, method) for method in comparison.methods]
     theirs = [
         published_average(comparison, "milliseconds", method)
         if clip is None
@@ -200,16 +199,17 @@ def time_table(comparison: Comparison, clip: str | None = None) -> Table:
     known = any(map(isfinite, theirs))
     if known:
         columns += [THEIRS, "median [ms]"]
-        groups += [f"median / {base}", "reference"]
+        groups += [f"time / {base}", "reference"]
     rows = []
     for method, (mine, printed) in where.items():
-        row = [method, *_cells(comparison, TIMES, clip, method), number(divide(mine, unit), 1)]
+        row = [method, *_cells(comparison, TIMES, clip, method), number(divide(mine, unit), 2)]
         rows.append(
-            tuple([*row, number(divide(printed, printed_unit), 1), number(printed, 2)] if known else row)
+            tuple([*row, number(divide(printed, printed_unit), 2), number(printed, 2)] if known else row)
         )
     note = (
-        "Compiling or loading kernels is warm-up and not contained. Ratios are of medians, to "
-        f"{base} in the same run. Means over the clips; of warm-ups the longest."
+        "Compiling or loading kernels is warm-up and not contained. Ratios are of whole clips, to "
+        f"{base} in the same run; single calls contain Python's share. Means over the clips; of warm-ups the "
+        "longest. The reference's are medians of its C++."
     )
     title = "Time" if clip else ALL
     return Table(title, tuple(columns), tuple(rows), tuple(groups), note="" if clip else note)

@@ -68,11 +68,11 @@ def _describe_best(comparison: Comparison, quantity: str) -> Paragraph:
 
 def _describe_times(comparison: Comparison) -> Paragraph:
     base = baseline(comparison)
-    values = {method: average(comparison, method, "median_us") for method in comparison.methods}
+    values = {method: average(comparison, method, "batch_us") for method in comparison.methods}
     order = sorted((value, method) for method, value in values.items() if isfinite(value))
     if not order:
         return Paragraph("")
-    text = f"A single call takes {order[0][0]:.1f} µs with {order[0][1]}, the fastest (median)"
+    text = f"A frame takes {order[0][0]:.1f} µs with {order[0][1]}, the fastest"
     if len(order) > 1:
         text += f", and {order[-1][0]:.1f} µs with {order[-1][1]}, the slowest"
         ratio = divide(order[-1][0], values.get(base, float("nan")))

@@ -49,11 +49,11 @@ class Mark:
 def find_marks(comparison: Comparison) -> tuple[Mark, ...]:
     """Methods with a mean error and time; times are ratios to the baseline's if it has one, else [us]."""
     base = baseline(comparison)
-    unit = average(comparison, base, "median_us")
+    unit = average(comparison, base, "batch_us")
     published_unit = published_average(comparison, "milliseconds", base)
     marks = []
     for method in comparison.methods:
-        time, error = average(comparison, method, "median_us"), average(comparison, method, "position")
+        time, error = average(comparison, method, "batch_us"), average(comparison, method, "position")
         if not (isfinite(time) and time > 0 and isfinite(error) and error > 0):
             continue
         theirs = (
@@ -75,7 +75,7 @@ def draw_trade(comparison: Comparison) -> Canvas | None:
     marks, base = find_marks(comparison), baseline(comparison)
     if not marks:
         return None
-    ratio = isfinite(average(comparison, base, "median_us"))
+    ratio = isfinite(average(comparison, base, "batch_us"))
     canvas = Canvas(figsize=(WIDTH, 5.6), dpi=DPI)
     add_heading(
         canvas, "Error against time", f"mean over {plain(list_names(averaged_clips(comparison)), 60)}"
@@ -95,7 +95,7 @@ def draw_trade(comparison: Comparison) -> Canvas | None:
         axes.plot(*mark.place, "o", ms=7.5, color=colour, mec="white", mew=0.8, zorder=4)
     places = np.array([place for mark in marks for place in (mark.place, mark.published) if place])
     times, errors = places.T
-    unit = f"median time of a frame, as a ratio to {base}" if ratio else "median time of a frame [µs]"
+    unit = f"time of a frame, as a ratio to {base}" if ratio else "time of a frame [µs]"
     style_axes(axes, times, "position error over height", unit)
     axes.set(xscale="log", yscale="log")
     axes.set_xlim(times.min() / 1.5, times.max() * 1.5)
