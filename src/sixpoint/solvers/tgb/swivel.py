@@ -130,13 +130,16 @@ def solve_easiest(target, l1, l2, h, weight, limits, balls, ball, low, high):
     n, distance = direction(target)
     d, cosine, sine, flexion = triangle(distance, l1, l2)
     u = across((0.0, 0.0, h), n)  # elbows start behind the limb, knees before it
+    at_zero = root_at(n, u, cosine, sine, h, 0.0)
     best, least = 0.0, 1e300
     for step in (COARSE, FINE):
         middle, count = best, HALF_CIRCLE if step == COARSE else NEAR
+        root = qt.mul(qt.from_axis_angle(n, middle - count * step), at_zero)
+        turn = qt.from_axis_angle(n, step)
         for k in range(-count, count + 1):
-            phi = middle + step * k
-            cost = effort(root_at(n, u, cosine, sine, h, phi), weight)
+            cost = effort(root, weight)
             if cost < least:
-                best, least = phi, cost
+                best, least = middle + step * k, cost
+            root = qt.mul(turn, root)
     root = root_at(n, u, cosine, sine, h, best)
     return finish(root, flexion, n, d, l1, l2, h, limits, balls, ball, low, high)
