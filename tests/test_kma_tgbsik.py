@@ -21,7 +21,7 @@ SAMPLES = pytest.mark.parametrize("sample", sorted(sp.SAMPLES))
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 DOWN = np.array([0.0, -1.0, 0.0])
 LENGTHS = (0.31, 0.27)
-NARROW = 8.0
+NARROW = 6.5
 """Effort [rad^2] above which the upper segment is nearly straight up, where valleys are narrow."""
 seeds = st.integers(0, 2**32 - 1)
 
