@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check benchmark results peers study examples clean
+.PHONY: demo test check benchmark results comparison peers study examples clean
 
 demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
 	$(BIN)/sixpoint demo --force
@@ -23,12 +23,16 @@ benchmark: $(VENV)/run.stamp  ## Time a warm solver beside forward kinematics
 results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/results.md
 	$(BIN)/python benchmarks/paper_table.py
 
+comparison: $(VENV)/run.stamp  ## Compare all methods on the paper's clips and rewrite docs/results.md
+	$(BIN)/python benchmarks/comparison.py
+
 peers: $(VENV)/run.stamp  ## Time six targets on hinges beside mink and rewrite docs/results.md
 	@$(PIP) install --editable '.[bench]'
 	$(BIN)/python benchmarks/peers.py --docs
 
-study: $(VENV)/run.stamp  ## Make the figures of the FLEXT paper again and rewrite docs/flext
+study: $(VENV)/run.stamp  ## Make the figures of both papers again and rewrite docs/flext and docs/sik
 	$(BIN)/sixpoint study flext --out docs/flext --force
+	$(BIN)/sixpoint study sik --out docs/sik --force
 
 examples: $(VENV)/run.stamp  ## Run the examples and rewrite docs/shelf_reach
 	$(BIN)/python examples/shelf_reach.py --out docs/shelf_reach --force
