@@ -66,7 +66,7 @@ def draw_limb(
     add_legend(canvas, ((RIGHT, "as solved"), (GHOST_ARM, "other swivel angles"), (INK, "known wrist")))
     places, world = (a[0] for a in motion.transforms)
     body = [p for p in _parts(figure, places, world, False) if not hangs_on(p, arms[0])]
-    scale = tall / 0.83
+    scale = tall / 0.86
     for k, (view, caption) in enumerate(zip((camera(*BESIDE), camera(*ASLANT)), captions, strict=True)):
         middle = (view @ arms[0].mean(axis=0))[:2] + ASIDE[k]
         corner = np.array([*(middle - np.array([0.48 * wide, tall / 2]) / scale), scale])
