@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("patient", deadline=None)  # machines are shared, and the first call compiles
+settings.load_profile("patient")
 
 
 def data_folder() -> Path | None:
