@@ -62,6 +62,7 @@ def flexion_of(limb: AnalyticLimb, target: np.ndarray) -> float:
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, shares, angles)
 def test_the_end_is_there_at_any_swivel_angle(end, seed, share, phi):
     """Forward kinematics give the target, and the triangle has the limb's lengths."""
@@ -78,7 +79,7 @@ def test_the_end_is_there_at_any_swivel_angle(end, seed, share, phi):
 
 
 @ENDS
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(seeds, shares)
 def test_the_middle_joint_goes_round_a_circle(end, seed, share):
     """Its circle is normal to the line to the target and centred on it; a whole turn comes back."""
@@ -98,6 +99,7 @@ def test_the_middle_joint_goes_round_a_circle(end, seed, share):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, shares, angles, seeds)
 def test_the_swivel_angle_is_read_back(end, seed, share, phi, way):
     """From the reference to the middle joint, right-handed about the line to the target, it is phi."""
@@ -121,6 +123,7 @@ def test_at_angle_zero_elbows_are_down_and_knees_forward(end):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, shares, angles)
 def test_elbows_fold_forward_and_knees_backward(end, seed, share, phi):
     """In the upper segment's frame the lower one is turned about X alone: to +Z at elbows, -Z at knees."""
@@ -137,6 +140,7 @@ def test_elbows_fold_forward_and_knees_backward(end, seed, share, phi):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, st.floats(1.0001, 30), angles)
 def test_out_of_reach_it_is_straight_and_points_there(end, seed, share, phi):
     """Beyond its length the limb is stretched along the line to the target, which it misses by the rest."""
@@ -151,6 +155,7 @@ def test_out_of_reach_it_is_straight_and_points_there(end, seed, share, phi):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, st.one_of(st.just(0.0), st.floats(0.001, 0.99)), angles)
 def test_too_near_it_is_folded_flat(end, seed, share, phi):
     """Nearer than the difference of the lengths the end comes as near as it can, on the line."""
@@ -166,6 +171,7 @@ def test_too_near_it_is_folded_flat(end, seed, share, phi):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, st.floats(0.4, 0.95), angles, seeds)
 def test_the_posture_is_continuous(end, seed, share, phi, way):
     """A target moved by a little moves the posture by a little, but where the reference is on the line."""
@@ -326,6 +332,7 @@ def test_intervals_come_in_every_form(end):
 
 
 @ENDS
+@settings(max_examples=40, deadline=None)
 @given(seeds, st.floats(0.0, 0.99))
 def test_a_flexion_out_of_range_has_no_swivels(end, seed, share):
     """Where the hinge would have to fold beyond its limit nothing is feasible, where not something may be."""
@@ -379,19 +386,32 @@ def test_wrong_limbs_and_targets_are_refused():
     """No such limb, no direction, no numbers, no rotation: errors that say what would work."""
     with pytest.raises(sp.SixpointError, match="l_wrist"):
         AnalyticLimb(FIGURE, "l_elbow")
-    for reference in ([0.0, 0.0, 0.0], [np.nan, 0.0, 1.0]):
-        with pytest.raises(sp.SixpointError, match="direction"):
-            AnalyticLimb(FIGURE, "l_wrist", reference)
+    with pytest.raises(sp.SixpointError, match="direction"):
+        AnalyticLimb(FIGURE, "l_wrist", [0.0, 0.0, 0.0])
     limb, target = LIMB["r_wrist"], [0.1, -0.3, 0.2]
-    for wrong in ([0.1, 0.2], [0.1, np.nan, 0.2], [np.inf, 0.0, 0.0], 0.3, None, np.zeros((1, 3))):
+    for wrong in (
+        [0.1, 0.2],
+        [0.1, np.nan, 0.2],
+        [np.inf, 0.0, 0.0],
+        0.3,
+        None,
+        "here",
+        [1e300, 0, 0],
+        np.zeros((1, 3)),
+    ):
         for call in (limb.solve, limb.feasible_swivels):
-            with pytest.raises(sp.TargetError, match="three finite numbers"):
+            with pytest.raises(sp.TargetError, match="3 finite numbers"):
                 call(wrong)
     for turn in ([0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [np.nan, 0, 0, 1], [np.inf, 0, 0, 1]):
         with pytest.raises(sp.TargetError, match="quaternion"):
             limb.solve(target, 0.0, turn)
         with pytest.raises(sp.TargetError, match="quaternion"):
             limb.feasible_swivels(target, turn)
+    with pytest.raises(sp.TargetError, match="swivel"):
+        limb.solve(target, np.nan)
+    for wrong in ([0.0, 1.0], "up", [np.inf, 0.0, 1.0]):
+        with pytest.raises(sp.SixpointError, match="3 finite numbers"):
+            AnalyticLimb(FIGURE, "l_wrist", wrong)
     with pytest.raises(sp.SixpointError, match="hands"):
         LIMB["l_ankle"].feasible_swivels([0.0, -0.7, 0.1], [0, 0, 0, 1])
 

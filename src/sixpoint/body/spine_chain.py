@@ -35,14 +35,21 @@ class SpineChain:
     node: Mapping[int, int]
 
     @classmethod
-    def from_figure(cls, figure: Figure) -> SpineChain:
-        """Merge coincident joints: of joints at one place the first rotates, the others follow."""
+    def from_figure(cls, figure: Figure, own_pelvis: bool = False) -> SpineChain:
+        """Merge coincident joints: of joints at one place the first rotates, the others follow.
+
+        Args:
+            figure: Whose trunk.
+            own_pelvis: A spine joint at the pelvis' place rotates apart from it; the pelvis then carries a
+                segment without length.
+        """
         trunk = (figure.roles.pelvis, *figure.roles.spine)
         places = [figure.rest_positions[j] for j in trunk]
         node = {trunk[0]: 0}
         joints, points = [trunk[0]], [places[0]]
         for joint, place in zip(trunk[1:], places[1:], strict=True):
-            if np.linalg.norm(place - points[-1]) > COINCIDENT:
+            first = own_pelvis and len(joints) == 1 and len(trunk) > 2
+            if first or np.linalg.norm(place - points[-1]) > COINCIDENT:
                 joints.append(joint)
                 points.append(place)
             node[joint] = len(points) - 1

@@ -37,7 +37,8 @@ from sixpoint.solvers.six_points.tree import (
 SWEEPS = 20  # the stop rule of Unzueta et al. 2008, section 9: 20 iterations, 1 cm, or a gain below 1 mm
 GAIN = 1e-3  # m
 NEAR = 1e-6  # m, a lever shorter than this turns nothing
-STRAIGHT = 1e-3  # rad, the flexion that gets a straight limb off its dead point
+STRAIGHT = 1e-3  # rad, a limb flexed by less is at its dead point
+KINK = 0.3  # rad, the flexion that gets it off: about what 1 cm of a limb needs
 X = (1.0, 0.0, 0.0)
 
 
@@ -131,9 +132,12 @@ def solve_chain(tree, balls, limits, from_root, first, count, end, target, local
     place_chain(tree.offsets, tree.parents, local, first, count, 2, world, positions)
     error = vec.norm(vec.sub(target, end_position(tree.offsets, tree.ends, world, positions, end)))
     if error > REACHED and abs(qt.twist_angle(qt.load(local, hinge), X)) < STRAIGHT:
-        # All turns of a straight limb towards a target on its line are zero.
-        angle = STRAIGHT if tree.ranges[hinge, 1] > STRAIGHT else -STRAIGHT
+        # All turns of a straight limb towards a target on its line are zero, and a flexed hinge would turn
+        # back if it came first: so flex it and turn the joints above.
+        angle = KINK if tree.ranges[hinge, 1] > STRAIGHT else -KINK
         qt.store(local, hinge, qt.from_axis_angle(X, angle))
+        place_chain(tree.offsets, tree.parents, local, first, count, 2, world, positions)
+        sweep(tree, balls, limits, True, first, count - 1, 2, end, target, local, world, positions)
         place_chain(tree.offsets, tree.parents, local, first, count, 2, world, positions)
     error, sweeps = 1e300, 0
     while sweeps < SWEEPS:

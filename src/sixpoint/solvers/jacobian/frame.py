@@ -37,7 +37,7 @@ from sixpoint.solvers.six_points.tree import (
 M = 3 * ENDS
 ITERATIONS = 20  # the stop rule of the paper: 20 iterations, 1 cm, or a gain below 1 mm
 GAIN = 1e-3  # m
-GIMBAL = 1.0 - 1e-9  # sine of the middle angle at which the outer two turn about one line
+GIMBAL = 1.0 - 1e-13  # sine of the middle angle at which the outer two turn about one line
 X = (1.0, 0.0, 0.0)
 
 LEVERS, PART, STEP = 2 * M, 2 * M + ENDS, 2 * M + ENDS + 1

@@ -33,6 +33,8 @@ RULES = {
 }
 DAMPING = 0.075
 """Damping factor [m]. The paper's "75" has no unit; as millimetres it is this, as cm^2 nearly so."""
+LEAST_DAMPING = 1e-5
+"""Below it the normal equations of "dls" are singular in double precision [m]."""
 REACH = 0.1
 """Farthest that one iteration asks an end to move [m]."""
 
@@ -70,9 +72,9 @@ class JacobianIK(TreeSolver):
     ) -> None:
         if step not in RULES:
             raise SixpointError(f"no step rule named {step!r}; there are: {listed(RULES)}")
-        if not 0 < damping < np.inf or not 0 < reach < np.inf:
+        if not LEAST_DAMPING <= damping < np.inf or not 0 < reach < np.inf:
             raise SixpointError(
-                f"damping and reach are positive lengths in metres, got {damping} and {reach}"
+                f"damping, from {LEAST_DAMPING:g}, and reach are lengths in metres; got {damping} and {reach}"
             )
         self.step, self.damping, self.reach, self.solve_root = step, float(damping), float(reach), solve_root
         super().__init__(figure, weights=weights, limits=limits)

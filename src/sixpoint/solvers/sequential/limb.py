@@ -61,11 +61,11 @@ def solve_limb(target, l1, l2, h, limits, balls, ball, flexion_low, flexion_high
     if not changed and flexion_low <= flexion <= flexion_high:
         return root, hinge, vec.scale(d, u)
     # Line 7, elbow-torso avoidance, belongs here.
-    return _close_on(limited, target, l1, l2, h, balls, ball, flexion_low, flexion_high)
+    return close_on(limited, target, l1, l2, h, balls, ball, flexion_low, flexion_high)
 
 
 @helper
-def _close_on(root, target, l1, l2, h, balls, ball, flexion_low, flexion_high):
+def close_on(root, target, l1, l2, h, balls, ball, flexion_low, flexion_high):
     """Lines 8-12: turn the clamped upper segment about itself and flex, as near to the target as it gets."""
     y = qt.y_axis(root)
     reach = vec.madd(target, l1, y)  # from the middle joint to the target; the segment runs along -y

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
-from sixpoint.body.figure import Figure
+from sixpoint.body.figure import Figure, SpineChain
 from sixpoint.kernels.swing_twist import build_ball_rows
 from sixpoint.solvers.six_points.packing import STRETCH_POSES, Model
 
@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def build_model(figure: Figure) -> Model:
-    """Lower a figure."""
-    roles, chain = figure.roles, figure.spine_chain
+def build_model(figure: Figure, chain: SpineChain | None = None) -> Model:
+    """Lower a figure; its trunk is ``figure.spine_chain`` unless another is given."""
+    roles, chain = figure.roles, chain or figure.spine_chain
     joints = (*chain.joints, *_limb_joints(figure))
     segments = chain.segments
     share = 1.0 - 2.0 * np.arange(len(segments)) / max(len(segments) - 1, 1)  # eq. 1, summed along the chain
     turns, chords = _stretch_poses(segments)
-    chest, girdle, clavicles = _arms(figure)
+    chest, girdle, clavicles = _arms(figure, chain)
     before = rot.inv(figure.neutral[np.maximum(figure.skeleton.parents, 0)])
     before[0] = rot.IDENTITY
     return Model(
@@ -86,8 +86,8 @@ def _limit(figure: Figure, joint: int) -> SwingTwist | None:
     return dof.limit if isinstance(dof, Ball) else None
 
 
-def _arms(figure: Figure) -> tuple[Index, Array, Array]:
-    chain, roles = figure.spine_chain, figure.roles
+def _arms(figure: Figure, chain: SpineChain) -> tuple[Index, Array, Array]:
+    roles = figure.roles
     chest, girdle, clavicles = np.zeros(2, np.int64), np.zeros((2, 3)), np.zeros((2, 3))
     for k, shoulder in enumerate(roles.shoulder):
         first = roles.clavicle[k] if roles.clavicle else shoulder

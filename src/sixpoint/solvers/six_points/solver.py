@@ -69,12 +69,16 @@ class SixPointSolver(ABC):
         if max(self.weights) > 1e6 or (0 < max(self.weights) < 1e-6):
             raise SixpointError(f"weights are compared with each other: numbers around 1, got {weights}")
         self.limits = bool(limits)
-        model = build_model(figure)
+        model = self._build_model()
         self._arrays = self._lower(model)
         self._trunk = len(model.segments)
         self._start = np.zeros((self._trunk + LIMB_ROWS + MEMORY_ROWS, 4))
         self._start[:-MEMORY_ROWS] = rot.IDENTITY
         self._adapted: dict[float, Array] = {}
+
+    def _build_model(self) -> Model:
+        """The figure lowered."""
+        return build_model(self.figure)
 
     def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
         """The figure as the entry's first arrays."""

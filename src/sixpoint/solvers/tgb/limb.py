@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges
 from sixpoint.body.figure import Figure
+from sixpoint.body.limits import Limits
 from sixpoint.errors import SixpointError, TargetError, listed
 from sixpoint.kernels.swing_twist import build_ball_rows
+from sixpoint.solvers.six_points.frame import FAR
 from sixpoint.solvers.tgb.feasible import SAMPLES, find_feasible
 from sixpoint.solvers.tgb.swivel import solve_at
 
@@ -55,12 +57,15 @@ class AnalyticLimb:
         figure: Whose limb.
         end: "l_wrist", "r_wrist", "l_ankle" or "r_ankle".
         reference: (3,) direction of angle 0; by default down for elbows and forward for knees.
+        limits: Ranges of forearm and wrist, which a figure does not carry; the shipped table by default.
 
     Raises:
         SixpointError: There is no such limb, or the reference has no direction.
     """
 
-    def __init__(self, figure: Figure, end: str, reference: ArrayLike | None = None) -> None:
+    def __init__(
+        self, figure: Figure, end: str, reference: ArrayLike | None = None, limits: Limits | None = None
+    ) -> None:
         if end not in LIMBS:
             raise SixpointError(f"no limb ends at {end!r}; there are: {listed(LIMBS)}")
         number = LIMBS.index(end)
@@ -76,15 +81,15 @@ class AnalyticLimb:
         self.lengths = (upper, lower)
         self._limb = np.array([upper, lower, low, high, self._h])
         self._balls = build_ball_rows([ball.limit])
-        self._wrist = self._end_ranges(middle, tip) if number < 2 else None
+        self._wrist = self._end_ranges(middle, tip, limits) if number < 2 else None
         side = np.array([0.0, -1.0, 0.0] if number < 2 else [0.0, 0.0, 1.0])
-        self.reference = side if reference is None else np.asarray(reference, float).reshape(3)
+        self.reference = side if reference is None else _numbers(reference, 3, "the reference is a direction")
         if not np.linalg.norm(self.reference) > 1e-6:
             raise SixpointError("the reference of the swivel angle needs a direction")
 
-    def _end_ranges(self, elbow: int, wrist: int) -> Array:
+    def _end_ranges(self, elbow: int, wrist: int, limits: Limits | None) -> Array:
         """(3, 2) pronation, flexion and deviation [rad]."""
-        dofs = self.figure.full_dofs()
+        dofs = self.figure.full_dofs(limits)
         forearm, hand = dofs[elbow], dofs[wrist]
         assert isinstance(forearm, Hinges) and isinstance(hand, Hinges)
         return np.array([[dof.lower[k], dof.upper[k]] for dof, k in ((forearm, 1), (hand, 0), (hand, 1))])
@@ -98,9 +103,11 @@ class AnalyticLimb:
             rotation: (4,) rotation that the end should have.
 
         Raises:
-            TargetError: The target is not three finite numbers, or the rotation has no length.
+            TargetError: The target, the angle or the rotation is no such thing.
         """
         goal, turn = self._checked(target, rotation)
+        if not np.isfinite(swivel):
+            raise TargetError(f"the swivel angle is a number [rad], got {swivel}")
         upper, lower, low, high, h = self._limb.tolist()
         reference = tuple(self.reference.tolist())
         root, hinge, position = solve_at(
@@ -123,7 +130,8 @@ class AnalyticLimb:
 
         Returns:
             (low, high) [rad] in -pi ... pi, the last may pass pi; the whole circle is (-pi, pi); nothing
-            where the flexion itself is out of range.
+            where the flexion itself is out of range. The circle is sampled every 5 degrees: a narrower
+            interval may be missed.
 
         Raises:
             SixpointError: A rotation was given for a leg: its ankle cannot turn about the shank.
@@ -146,12 +154,21 @@ class AnalyticLimb:
         return [(float(a), float(b)) for a, b in intervals[:count]]
 
     def _checked(self, target: ArrayLike, rotation: ArrayLike | None) -> tuple[Array, Array | None]:
-        goal = np.array(target, float)
-        if goal.shape != (3,) or not np.all(np.isfinite(goal)):
-            raise TargetError(f"the target of a limb is three finite numbers [m], got {target!r}")
+        goal = _numbers(target, 3, "the target of a limb is a position [m]")
         if rotation is None:
             return goal, None
-        turn = np.array(rotation, float)
-        if turn.shape != (4,) or not 1e-6 < np.linalg.norm(turn) < np.inf:
+        turn = _numbers(rotation, 4, "a rotation is a quaternion xyzw")
+        if not np.linalg.norm(turn) > 1e-6:
             raise TargetError(f"a rotation is a quaternion xyzw, got {rotation!r}")
         return goal, turn / np.linalg.norm(turn)
+
+
+def _numbers(values: ArrayLike, count: int, what: str) -> Array:
+    """Finite numbers of a fixed count, none absurdly large."""
+    try:
+        array = np.array(values, float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (count,) or not np.all(np.abs(array) < FAR):
+        raise TargetError(f"{what}: {count} finite numbers, got {values!r}")
+    return array

@@ -131,15 +131,31 @@ def solve_easiest(target, l1, l2, h, weight, limits, balls, ball, low, high):
     d, cosine, sine, flexion = triangle(distance, l1, l2)
     u = across((0.0, 0.0, h), n)  # elbows start behind the limb, knees before it
     at_zero = root_at(n, u, cosine, sine, h, 0.0)
-    best, least = 0.0, 1e300
-    for step in (COARSE, FINE):
-        middle, count = best, HALF_CIRCLE if step == COARSE else NEAR
-        root = qt.mul(qt.from_axis_angle(n, middle - count * step), at_zero)
-        turn = qt.from_axis_angle(n, step)
-        for k in range(-count, count + 1):
+    # The two lowest samples with higher neighbours: the lowest valley may be narrower than a step.
+    first, second, low_first, low_second = 0.0, 0.0, 1e300, 1e300
+    turn = qt.from_axis_angle(n, COARSE)
+    root = qt.mul(qt.from_axis_angle(n, -(HALF_CIRCLE + 1) * COARSE), at_zero)
+    before = effort(root, weight)
+    root = qt.mul(turn, root)
+    cost = effort(root, weight)
+    for k in range(1 - HALF_CIRCLE, HALF_CIRCLE + 2):
+        root = qt.mul(turn, root)
+        after = effort(root, weight)
+        if before >= cost <= after:
+            if cost < low_first:
+                second, low_second = first, low_first
+                first, low_first = COARSE * (k - 1), cost
+            elif cost < low_second:
+                second, low_second = COARSE * (k - 1), cost
+        before, cost = cost, after
+    best, least = first, 1e300
+    for middle in (first, second):
+        root = qt.mul(qt.from_axis_angle(n, middle - NEAR * FINE), at_zero)
+        turn = qt.from_axis_angle(n, FINE)
+        for k in range(-NEAR, NEAR + 1):
             cost = effort(root, weight)
             if cost < least:
-                best, least = middle + step * k, cost
+                best, least = middle + FINE * k, cost
             root = qt.mul(turn, root)
     root = root_at(n, u, cosine, sine, h, best)
     return finish(root, flexion, n, d, l1, l2, h, limits, balls, ball, low, high)
