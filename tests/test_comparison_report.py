@@ -76,7 +76,7 @@ def make_comparison():
             if method == "jt" and lost:
                 rows.append(Row(clip, method, 30, 60.0, error=REASON, failed_frames=30))
             else:
-                rows.append(make_row(clip, method, 100 * c + m, weights="1,1,0" if method == "sik" else ""))
+                rows.append(make_row(clip, method, 100 * c + m, options="limits=True weights=1,1,0" if method == "sik" else ""))
         clips.append(make_clip(clip, [m for m in METHODS if m != "jt" or not lost]))
     known = [m for m in METHODS if m != "jt"]
     rng = np.random.default_rng(7)

@@ -42,6 +42,7 @@ from sixpoint.solvers.prioritized.tasks import (
 )
 from sixpoint.solvers.registry import SOLVERS, make_solver
 from sixpoint.solvers.sequential.solver import SequentialIK
+from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.solvers.tgb.limb import AnalyticLimb
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
 from sixpoint.study.metrics import Errors, compute_errors
@@ -50,8 +51,10 @@ __version__ = "0.1.0"
 
 __all__ = [
     "EFFECTORS",
+    "FIGHTING",
     "SAMPLES",
     "SOLVERS",
+    "WALKING",
     "AlignTask",
     "AnalyticLimb",
     "BalanceTask",

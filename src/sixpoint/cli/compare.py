@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from sixpoint.cli.options import Force, Frames, LimitsFile, Mapping, NoLimits
+from sixpoint.cli.options import Force, Frames, LimitsFile, Mapping, NoLimits, Skeleton
 from sixpoint.cli.screen import Screen
 from sixpoint.errors import SixpointError
 
@@ -49,6 +49,7 @@ def compare(
         str | None,
         Parameter(help="Influence of wrists, ankles and the last frame on the pelvis, e.g. 1,1,0."),
     ] = None,
+    skeleton: Skeleton = None,
     mapping: Mapping = None,
     limits: LimitsFile = None,
     no_limits: NoLimits = False,
@@ -70,7 +71,9 @@ def compare(
     """
     from sixpoint.jobs.compare.job import compare as run
 
-    chosen = _study(list(clips), study, data, methods, frames, weights, mapping, no_limits)
+    if limits is not None and no_limits:
+        raise SixpointError("--limits FILE and --no-limits exclude each other")
+    chosen = _study(list(clips), study, data, methods, frames, weights, skeleton, mapping, no_limits)
     screen = Screen()
     with screen.progress() as progress:
         done = run(chosen, out, limits_file=limits, force=force, progress=progress)
@@ -78,7 +81,8 @@ def compare(
         rows = [row for row in done.rows if row.clip == clip.name]
         frames_of = max(row.frames for row in rows)
         screen.say(f"{clip.name}: {frames_of} frames", style="bold")
-        screen.table(COLUMNS, [_cells(row) for row in rows if not row.error])
+        if any(not row.error for row in rows):
+            screen.table(COLUMNS, [_cells(row) for row in rows if not row.error])
         for error, names in _failures(rows).items():
             screen.note(f"{clip.name}, {', '.join(names)}: {error}", "failed", "red")
         screen.say()
@@ -102,6 +106,7 @@ def _study(
     methods: str | None,
     frames: str | None,
     weights: str | None,
+    skeleton: Path | None,
     mapping: Path | None,
     no_limits: bool,
 ) -> Study:
@@ -112,22 +117,25 @@ def _study(
     from sixpoint.jobs.compare.study import find_study, read_study, study_of_files
     from sixpoint.jobs.reading import parse_frames
     from sixpoint.jobs.solving import parse_weights
+    from sixpoint.solvers.six_points.solver import check_weights
 
     if study is None and len(clips) == 1 and clips[0].suffix == ".toml":
         study, clips = str(clips[0]), []
     if study is not None:
         if clips:
             raise SixpointError("a study names its own clips: give either --study or files")
-        if frames or weights or mapping:
-            raise SixpointError("--frames, --weights and --mapping are for clips; a study says them itself")
+        if frames or weights or skeleton or mapping:
+            raise SixpointError(
+                "--frames, --weights, --skeleton and --mapping are for clips; a study says them itself"
+            )
         made = read_study(find_study(study), data)
     else:
         if data is not None:
             raise SixpointError("--data is the folder of a study's recordings: give --study too")
         if frames:
             parse_frames(frames)
-        parsed = None if weights is None else parse_weights(weights)
-        made = study_of_files(clips, frames or "", parsed, mapping=mapping)
+        parsed = None if weights is None else check_weights(parse_weights(weights))
+        made = study_of_files(clips, frames or "", parsed, mapping=mapping, skeleton=skeleton)
     if methods is not None:
         made = replace(made, methods=choose_methods(methods))
     return replace(made, limits=False) if no_limits else made
@@ -146,12 +154,16 @@ def _cells(row: Row) -> list[str]:
     failed = f" ({row.failed_frames} failed)" if row.failed_frames else ""
     return [
         row.method + failed,
-        f"{row.position:.4f}",
-        f"{row.orientation:.3f}",
+        _number(row.position, 4),
+        _number(row.orientation, 3),
         f"{100 * row.missed:.0f} %",
-        f"{100 * row.residual_mean:.2f}",
-        f"{row.batch_us:.1f}",
-        f"{row.median_us:.1f}",
-        f"{row.jerk_ratio:.2f}",
-        f"{row.swivel_jumps:.0f}",
+        _number(100 * row.residual_mean, 2),
+        _number(row.batch_us, 1),
+        _number(row.median_us, 1),
+        _number(row.jerk_ratio, 2),
+        _number(row.swivel_jumps, 0),
     ]
+
+
+def _number(value: float, digits: int) -> str:
+    return "-" if value != value else f"{value:.{digits}f}"

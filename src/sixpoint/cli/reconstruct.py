@@ -33,7 +33,13 @@ def reconstruct(
         float | None, Parameter(help="For six points: stature of the built-in figure [m]; 1.75 by default.")
     ] = None,
     frames: Frames = None,
-    method: Annotated[str, Parameter(help="How to solve: sik, pik or pik-flext.")] = "sik",
+    method: Annotated[
+        str,
+        Parameter(
+            help="How to solve: sik, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik or pik-flext; "
+            "`module:Class` for your own."
+        ),
+    ] = "sik",
     weights: Annotated[
         str | None,
         Parameter(

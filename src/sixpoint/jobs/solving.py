@@ -14,7 +14,7 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError, listed
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.solvers.base import MotionSolution
-from sixpoint.solvers.registry import SOLVERS, make_solver
+from sixpoint.solvers.registry import find_solver, make_solver
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Solving:
     """How to solve.
 
     Attributes:
-        method: A name of ``SOLVERS``.
+        method: A name of ``SOLVERS``, or ``module:Class``.
         weights: Influence of wrists, ankles and the last frame on the pelvis; None: the method's own.
         search: "exact" or "literal"; None: the method's own.
         limits: Keep joints within their limits.
@@ -41,11 +41,10 @@ class Solving:
         Raises:
             SixpointError: The message lists the methods, or the options of the method.
         """
-        if self.method not in SOLVERS:
-            raise SixpointError(f"no method named {self.method!r}; methods: {listed(SOLVERS)}")
+        solver = find_solver(self.method)
         if not self.limits and self.limits_file is not None:
             raise SixpointError("--limits FILE and --no-limits exclude each other")
-        known = inspect.signature(SOLVERS[self.method]).parameters
+        known = inspect.signature(solver).parameters
         unknown = [name for name in self.options if name not in known]
         if unknown:
             raise SixpointError(f"the method {self.method!r} has no option {listed(unknown)}")

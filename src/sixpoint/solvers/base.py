@@ -27,7 +27,7 @@ class Status(IntEnum):
     CONVERGED = 0
     """Every effector is within 1 cm of its target (the stop criterion of Unzueta et al. 2008, section 9)."""
     UNREACHABLE = 1
-    """Some target is farther than the body, or its limits, can reach; the pose is the nearest found."""
+    """Some target is not met: beyond the body's reach or limits, or the method stopped before."""
     LOST = 2
     """Some target is unknown (NaN); its limb holds its last local pose, pelvis and head follow each other."""
 

@@ -24,7 +24,10 @@ PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "dls": ({}, f"damping {DAMPING:g} m, targets at most {REACH:g} m away; {STOP}"),
     "dls-svd": ({}, f"damping {DAMPING:g} m, targets at most {REACH:g} m away; {STOP}"),
     "sdls": ({}, f"largest turn 45 degrees, targets at most {REACH:g} m away; {STOP}"),
-    "pik": ({"tolerance": 0.01}, "levels pelvis, ankles, wrists, head, posture; stops at 1 cm or after 20"),
+    "pik": (
+        {"tolerance": 0.01},
+        "levels pelvis, ankles, wrists, head; stops at 1 cm, or by its own rule",
+    ),
     "pik-flext": ({"tolerance": 0.01}, "as pik, limbs by FLEXT in its secant form"),
 }
 """Method -> options that differ from the solver's own, and the preset in words."""
@@ -65,16 +68,27 @@ class Method:
             )
         return method
 
-    def make(self, figure: Figure, limits: bool, weights: tuple[float, float, float] | None) -> Solver:
-        """The solver of a figure; limits and weights are handed to solvers that know them."""
-        found = find_solver(self.solver)
-        known = _keywords(found)
+    def choose(self, limits: bool, weights: tuple[float, float, float] | None) -> dict[str, Any]:
+        """Options of the solver: its own, and the study's limits and weights where it knows them."""
+        known = _keywords(find_solver(self.solver))
         options = dict(self.options)
         if "limits" in known:
-            options["limits"] = limits
+            options.setdefault("limits", limits)
         if weights is not None and "weights" in known:
-            options["weights"] = weights
-        return found(figure, **options)
+            options.setdefault("weights", weights)
+        return options
+
+    def describe(self, limits: bool, weights: tuple[float, float, float] | None) -> str:
+        """The same as a text, for results."""
+        texts = []
+        for name, value in sorted(self.choose(limits, weights).items()):
+            numbers = value if isinstance(value, tuple | list) else (value,)
+            texts.append(f"{name}={','.join(f'{v:g}' if isinstance(v, float) else str(v) for v in numbers)}")
+        return " ".join(texts)
+
+    def make(self, figure: Figure, limits: bool, weights: tuple[float, float, float] | None) -> Solver:
+        """The solver of a figure."""
+        return find_solver(self.solver)(figure, **self.choose(limits, weights))
 
 
 def _keywords(solver: Callable[..., Solver]) -> list[str]:

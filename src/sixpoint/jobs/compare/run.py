@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from math import nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -100,20 +99,19 @@ def run_method(
         The row, and what is drawn; None where the method gave no result.
     """
     clip, truth = opened.clip, opened.truth
-    weights = "" if clip.weights is None else ",".join(f"{w:g}" for w in clip.weights)
-    head: dict[str, Any] = {"clip": clip.name, "method": method.name, "key": key, "weights": weights}
-    head |= {"frames": len(truth), "rate": truth.rate}
+    head: dict[str, Any] = {"clip": clip.name, "method": method.name, "key": key}
+    head |= {"frames": len(truth), "rate": truth.rate, "options": method.describe(limits, clip.weights)}
     try:
         start = time.perf_counter()
         solver = method.make(opened.figure, limits, clip.weights)
-        solver.warm_up()
+        getattr(solver, "warm_up", _nothing)()
         _first_batch(solver, opened.targets)
         warm = time.perf_counter() - start
-        result, failed = _solve(solver, opened.targets, frames)
+        result, failed, whole = _solve(solver, opened, frames)
         errors = compute_errors(opened.figure, truth, result)
         quality = measure_quality(opened.figure, truth, result, opened.targets)
         measured: dict[str, Any] = {name: float(value) for name, value in asdict(quality).items()}
-        batch = nan if failed else _time_batch(solver, opened.targets)
+        batch = _time_batch(solver, opened.targets) if whole else nan
         single = _time_calls(solver, opened.targets)
     except Exception as error:  # of any method, also a user's: it is a row, not the end of the comparison
         text = " ".join(str(error).split()) or type(error).__name__
@@ -160,19 +158,28 @@ def _first_batch(solver: Solver, targets: Targets) -> None:
         return
 
 
-def _solve(solver: Solver, targets: Targets, frames: Frames) -> tuple[Motion, int]:
-    """The motion and the number of frames that failed; those hold the pose before."""
+def _nothing() -> None:
+    """A user's own method need not warm up."""
+
+
+def _solve(solver: Solver, opened: OpenClip, frames: Frames) -> tuple[Motion, int, bool]:
+    """The motion, the number of frames that failed, and whether all were solved at once.
+
+    Where that raises, or is not offered, frames are solved one by one; a failing one holds the pose before.
+    """
     try:
-        return solver.solve_frames(targets, frames).motion, 0
+        return solver.solve_frames(opened.targets, frames).motion, 0, True
     except Exception:
-        return _solve_singly(solver, targets, frames)
+        motion, failed = _solve_singly(solver, opened, frames)
+        return motion, failed, False
 
 
-def _solve_singly(solver: Solver, targets: Targets, frames: Frames) -> tuple[Motion, int]:
+def _solve_singly(solver: Solver, opened: OpenClip, frames: Frames) -> tuple[Motion, int]:
+    targets = opened.targets
     poses: list[Pose] = []
     previous: Solution | None = None
     failed, last = 0, ""
-    held = solver.figure.neutral_pose
+    held = opened.figure.neutral_pose
     for number, points in enumerate(targets.positions, start=1):
         try:
             previous = solver.solve(points, previous, 1 / targets.rate)
@@ -210,26 +217,3 @@ def _time_calls(solver: Solver, targets: Targets) -> list[float]:
             solution = None
         times.append(time.perf_counter() - start)
     return times
-
-
-def save_run(run: Run, path: Path) -> None:
-    """Keep what is drawn of a run, whole or not at all."""
-    spare = path.with_name(f".{path.name}.tmp.npz")
-    np.savez_compressed(
-        spare,
-        position=run.position,
-        orientation=run.orientation,
-        rotations=run.sample.rotations,
-        translations=run.sample.translations,
-        moving=np.array(run.sample.moving),
-    )
-    spare.replace(path)
-
-
-def load_run(path: Path, opened: OpenClip, name: str) -> Run:
-    """What ``save_run`` kept."""
-    with np.load(path) as data:
-        moving = tuple(int(j) for j in data["moving"])
-        skeleton, rate = opened.truth.skeleton, opened.truth.rate
-        sample = Motion(skeleton, data["rotations"], data["translations"], rate, moving, name=name)
-        return Run(data["position"], data["orientation"], sample)

@@ -14,6 +14,8 @@ from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES
 from sixpoint.jobs.compare.methods import METHODS, Method
 from sixpoint.jobs.reading import parse_frames
+from sixpoint.solvers.six_points.solver import check_weights
+from sixpoint.study.comparison.claims import CLAIMS
 from sixpoint.study.comparison.model import Reference
 
 MOTIONS = tuple(suffix for suffix in MOTION_SUFFIXES if suffix != ".asf")
@@ -158,13 +160,16 @@ def read_study(path: Path, data: Path | None = None) -> Study:
     _check_names(entry, [clip.name for clip in clips])
     methods = _read_methods(entry)
     limits = entry.get("limits", bool, True)
+    claims = entry.get("claims", str, "")
+    if claims and claims not in CLAIMS:
+        raise entry.error(f"no claims named {claims!r}; there are: {listed(CLAIMS)}")
     return Study(
         entry.get("title", str) or path.stem,
         tuple(clips),
         methods,
         limits,
         _read_reference(entry),
-        entry.get("claims", str, ""),
+        claims,
     )
 
 
@@ -240,12 +245,13 @@ def _read_clip(row: _Entry, folder: Path) -> Clip | str:
         frames = source.get("frames", str) or row.get("frames", str) or ""
         if frames:
             parse_frames(frames)
+        weights = row.numbers("weights", 3, float)
         return Clip(
             row.get("name", str) or file.stem,
             file,
             folder / skeleton if skeleton else None,
             frames,
-            row.numbers("weights", 3, float),
+            None if weights is None else check_weights(weights),
             row.get("sample", int),
             row.numbers("window", 2, int),
             folder / mapping if mapping else None,

@@ -63,7 +63,7 @@ CLIPS = (
         "jump_kick",
         FIGHTING,
         "90_05",
-        (("paper/90_05_repaired.bvh", 1), ("90_05.amc", 0)),  # row 0 of the BVH is an added T-pose
+        (("90_05.amc", 0), ("paper/90_05_repaired.bvh", 1)),  # row 0 of the BVH is an added T-pose
         (0.0213, 0.2849),
     ),
     Clip(

@@ -134,7 +134,7 @@ def solve_chain(tree, balls, limits, from_root, first, count, end, target, local
     if error > REACHED and abs(qt.twist_angle(qt.load(local, hinge), X)) < STRAIGHT:
         # All turns of a straight limb towards a target on its line are zero, and a flexed hinge would turn
         # back if it came first: so flex it and turn the joints above.
-        angle = KINK if tree.ranges[hinge, 1] > STRAIGHT else -KINK
+        angle = KINK if tree.ranges[hinge, 1] > -tree.ranges[hinge, 0] else -KINK  # the way it flexes
         qt.store(local, hinge, qt.from_axis_angle(X, angle))
         place_chain(tree.offsets, tree.parents, local, first, count, 2, world, positions)
         sweep(tree, balls, limits, True, first, count - 1, 2, end, target, local, world, positions)

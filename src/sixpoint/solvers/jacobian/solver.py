@@ -46,7 +46,8 @@ class JacobianIK(TreeSolver):
         figure: What to pose.
         step: "transpose", "pseudoinverse", "dls" (damped least squares), "dls-svd" (the same by singular
             values) or "sdls" (selectively damped).
-        weights: Of the pelvis estimate, see ``SixPointSolver``.
+        weights: Influence of the wrists' line, the ankles' line and the previous frame on the pelvis' X axis,
+            at 120 Hz: ``FIGHTING`` = (1, 1, 0) follows at once, ``WALKING`` = (0.1, 0.1, 1) is steadier.
         limits: Keep every joint within the figure's limits, after each step.
         damping: Of "dls" and "dls-svd" [m].
         reach: Farthest that one step asks an end to move [m].
@@ -56,7 +57,6 @@ class JacobianIK(TreeSolver):
         SixpointError: An option has an impossible value; the message says what would work.
     """
 
-    name = "jacobian"
     _entry = staticmethod(solve_jacobian)
 
     def __init__(

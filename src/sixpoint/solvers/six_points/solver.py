@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -55,19 +55,14 @@ class SixPointSolver(ABC):
         SixpointError: The weights make no sense.
     """
 
-    name: ClassVar[str]
     _entry: ClassVar[Callable[..., None]]
     _compiling: ClassVar[str] = "about ten seconds"
 
     def __init__(
         self, figure: Figure, *, weights: tuple[float, float, float] = WALKING, limits: bool = True
     ) -> None:
-        if len(weights) != 3 or not np.all(np.isfinite(weights)) or min(weights) < 0 or max(weights) <= 0:
-            raise SixpointError(f"weights are three numbers, none negative, not all zero; got {weights}")
         self.figure = figure
-        self.weights = (float(weights[0]), float(weights[1]), float(weights[2]))
-        if max(self.weights) > 1e6 or (0 < max(self.weights) < 1e-6):
-            raise SixpointError(f"weights are compared with each other: numbers around 1, got {weights}")
+        self.weights = check_weights(weights)
         self.limits = bool(limits)
         model = self._build_model()
         self._arrays = self._lower(model)
@@ -190,6 +185,19 @@ class SixPointSolver(ABC):
             return (0,), pelvis[:, None]
         root = np.broadcast_to(self.figure.skeleton.offsets[0], pelvis.shape)
         return (0, joint), np.stack([root, pelvis], axis=1)
+
+
+def check_weights(weights: Sequence[float]) -> tuple[float, float, float]:
+    """Weights of the pelvis estimate as three numbers.
+
+    Raises:
+        SixpointError: They make no sense.
+    """
+    if len(weights) != 3 or not np.all(np.isfinite(weights)) or min(weights) < 0 or max(weights) <= 0:
+        raise SixpointError(f"weights are three numbers, none negative, not all zero; got {weights}")
+    if max(weights) > 1e6 or max(weights) < 1e-6:
+        raise SixpointError(f"weights are compared with each other: numbers around 1, got {weights}")
+    return float(weights[0]), float(weights[1]), float(weights[2])
 
 
 def weights_at_rate(weights: tuple[float, float, float], dt: float) -> tuple[float, float, float]:

@@ -28,7 +28,7 @@ class Row:
         frames: Frames of the clip.
         rate: Frames per second [Hz].
         key: Names what was measured: the files, frames and options of the clip, the method, and the code.
-        weights: Weights of the pelvis estimate, as ``1,1,0``; empty for the method's own.
+        options: Options that the solver was made with, as ``limits=True weights=1,1,0``.
         error: Why there is no result; empty where there is one.
         failed_frames: Frames for which the method raised or gave numbers that are not finite.
         position: RMS over frames of the mean joint distance over the figure's height, E_p.
@@ -66,7 +66,7 @@ class Row:
     frames: int
     rate: float
     key: str = ""
-    weights: str = ""
+    options: str = ""
     error: str = ""
     failed_frames: int = 0
     position: float = nan

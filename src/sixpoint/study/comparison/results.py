@@ -15,6 +15,7 @@ from sixpoint.study.comparison.model import Row
 VERSION = 1
 """Of the columns; a file of another version is not read."""
 COLUMNS = ("format", *(field.name for field in fields(Row)))
+HELP = "begin again with --force, or choose another folder with -o"
 KINDS = {field.name: {"str": str, "int": int, "float": float}[str(field.type)] for field in fields(Row)}
 
 
@@ -31,10 +32,29 @@ def rows_to_csv(rows: Iterable[Row]) -> str:
 def is_results(path: Path) -> bool:
     """Whether a file looks like a results file, of any version."""
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
             return stream.readline(300).startswith("format,clip,method,")
     except (OSError, UnicodeDecodeError):
         return False
+
+
+def check_version(path: Path) -> list[list[str]]:
+    """The lines of a results file of this version.
+
+    Raises:
+        FormatError: It cannot be read, or is of another version.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            lines = list(csv.reader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(path, f"cannot be read: {error}") from error
+    version = lines[1][0] if len(lines) > 1 and lines[1] else str(VERSION)
+    if not lines or version != str(VERSION) or tuple(lines[0]) != COLUMNS:
+        raise FormatError(
+            path, f"results of another version of sixpoint (format {version}, this one is {VERSION}): {HELP}"
+        )
+    return lines
 
 
 def rows_from_csv(path: Path) -> list[Row]:
@@ -43,21 +63,11 @@ def rows_from_csv(path: Path) -> list[Row]:
     Raises:
         FormatError: It is of another version, or a line is damaged; the message says which and what helps.
     """
-    try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            lines = list(csv.reader(stream))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FormatError(path, f"cannot be read: {error}") from error
-    version = lines[1][0] if len(lines) > 1 and lines[1] else str(VERSION)
-    help_ = "begin again with --force, or choose another folder with -o"
-    if not lines or version != str(VERSION) or tuple(lines[0]) != COLUMNS:
-        raise FormatError(
-            path, f"results of another version of sixpoint (format {version}, this one is {VERSION}): {help_}"
-        )
+    lines = check_version(path)
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         if len(line) != len(COLUMNS):
-            message = f"{len(line)} columns in place of {len(COLUMNS)}: mend the line or {help_}"
+            message = f"{len(line)} columns in place of {len(COLUMNS)}: mend the line or {HELP}"
             raise FormatError(path, message, line=number)
         try:
             values: dict[str, Any] = {
@@ -65,7 +75,7 @@ def rows_from_csv(path: Path) -> list[Row]:
             }
             rows.append(Row(**values))
         except ValueError as error:
-            raise FormatError(path, f"{error}: mend the line or {help_}", line=number) from error
+            raise FormatError(path, f"{error}: mend the line or {HELP}", line=number) from error
     return rows
 
 

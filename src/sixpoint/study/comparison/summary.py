@@ -127,9 +127,10 @@ def describe_clip(comparison: Comparison, clip: str, runs: ClipRuns | None) -> P
     text = []
     if rows:
         text.append(f"{count_of(rows[0].frames, 'frame')} at {rows[0].rate:g} Hz.")
-    weights = {row.weights: row.method for row in rows if row.weights}
+    words = [word for row in rows for word in row.options.split()]
+    weights = {word.removeprefix("weights=") for word in words if word.startswith("weights=")}
     if len(weights) == 1:
-        text.append(f"Weights of the pelvis estimate, where a method has it: {next(iter(weights))}.")
+        text.append(f"Weights of the pelvis estimate, where a method has it: {weights.pop()}.")
     if runs is None:
         text.append("The clip could not be read.")
     elif baseline(comparison) in runs.runs:
