@@ -188,7 +188,7 @@ def effort(matrices: np.ndarray, weight: float = 1.0) -> np.ndarray:
 
 
 def postures(target: np.ndarray, lengths: tuple[float, float], h: float, phi: np.ndarray) -> np.ndarray:
-    """Root rotations (F, 3, 3) at swivel angles (F,) from any direction (section 5 of METHODS, in NumPy)."""
+    """Root rotations (F, 3, 3) at swivel angles (F,) from any direction (, in NumPy)."""
     l1, l2 = lengths
     n, d = unit(target), np.clip(np.linalg.norm(target), abs(l1 - l2), l1 + l2)
     cosine = (l1**2 + d**2 - l2**2) / (2 * l1 * d)

@@ -90,7 +90,7 @@ def frames_met(solved: Solved) -> str:
     reached, missed, lost = (count(s) for s in (Status.CONVERGED, Status.UNREACHABLE, Status.LOST))
     text = f"{reached} reached"
     if missed:
-        text += f", {missed} not reached (a target beyond the body's reach or limits, or the method stopped before it)"
+        text += f", {missed} not reached (beyond the body's reach or limits, or the method stopped before)"
     if lost:
         text += f", {lost} with lost points"
     return text

@@ -15,6 +15,7 @@ from sixpoint.kernels.jit import entry, helper
 from sixpoint.solvers.ccd.frame import solve_spine
 from sixpoint.solvers.six_points.frame import (
     MEMORY_ROWS,
+    end_limb,
     end_trunk,
     estimate_pelvis,
     fill_lost,
@@ -86,9 +87,7 @@ def solve_frame(model, tree, options, points, local, memory, residual, world, po
             model.limbs[limb, 2],
             model.limbs[limb, 3],
         )
-        qt.store(local, row, upper)
-        qt.store(local, row + 2, hinge)
-        residual[limb + 2] = vec.norm(vec.sub(target, vec.add(place, qt.mul_vec(frame, end))))
+        end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     return judge(lost, residual), sweeps
 
 

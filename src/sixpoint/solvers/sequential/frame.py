@@ -14,6 +14,7 @@ from sixpoint.solvers.sequential.limb import solve_limb
 from sixpoint.solvers.sequential.packing import unpack_settings, unpack_work
 from sixpoint.solvers.six_points.frame import (
     MEMORY_ROWS,
+    end_limb,
     end_trunk,
     estimate_pelvis,
     fill_lost,
@@ -188,9 +189,7 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
             model.limbs[limb, 2],
             model.limbs[limb, 3],
         )
-        qt.store(local, row, upper)
-        qt.store(local, row + 2, hinge)
-        residual[limb + 2] = vec.norm(vec.sub(target, vec.add(place, qt.mul_vec(frame, end))))
+        end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     return judge(lost, residual)
 
 

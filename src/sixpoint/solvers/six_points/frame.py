@@ -71,6 +71,15 @@ def end_trunk(filled, memory, x, y, root, top, residual):
 
 
 @helper
+def end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual):
+    """Store a posed limb, and how far its end, given from ``place`` in ``frame``, is off its target."""
+    qt.store(local, row, upper)
+    qt.store(local, row + 2, hinge)
+    there = vec.add(place, qt.mul_vec(frame, end))
+    residual[limb + 2] = vec.norm(vec.sub(target, there))
+
+
+@helper
 def judge(lost, residual):
     """Status of the frame: CONVERGED, UNREACHABLE (a residual above 1 cm) or LOST (some point is unknown)."""
     if lost:

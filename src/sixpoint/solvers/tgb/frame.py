@@ -12,7 +12,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
 from sixpoint.solvers.sequential.frame import place_limb, pose_trunk
 from sixpoint.solvers.sequential.packing import unpack_settings, unpack_work
-from sixpoint.solvers.six_points.frame import MEMORY_ROWS, judge, write_frame
+from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, judge, write_frame
 from sixpoint.solvers.six_points.packing import limb_row, unpack_model
 from sixpoint.solvers.tgb.swivel import solve_easiest
 
@@ -41,9 +41,7 @@ def solve_frame(model, settings, weight, points, local, memory, residual, scratc
             model.limbs[limb, 2],
             model.limbs[limb, 3],
         )
-        qt.store(local, row, upper)
-        qt.store(local, row + 2, hinge)
-        residual[limb + 2] = vec.norm(vec.sub(target, vec.add(place, qt.mul_vec(frame, end))))
+        end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     return judge(lost, residual)
 
 
