@@ -16,7 +16,7 @@ import sixpoint as sp
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
 RESULTS = ROOT / "docs" / "results.md"
-MARKS = ("table", "pik")
+MARKS = ("table", "pik", "plus")
 
 PAPER = {"boxing": (0.0265, 0.2508), "jump kick": (0.0213, 0.2849), "playground": (0.0261, 0.3469)}
 PAPER_PIK = {"boxing": (0.0283, 0.3256), "jump kick": (0.0247, 0.3447), "playground": (0.0240, 0.3472)}
@@ -106,6 +106,56 @@ def table_pik(folder: Path) -> list[str]:
     return lines
 
 
+def table_plus(folder: Path) -> list[str]:
+    """Markdown rows of SIK+ beside Sequential IK: the paper's clips, and what its constants never saw."""
+    sets = {
+        "boxing": [("paper/17_10.amc", (1.0, 1.0, 0.0), 0)],
+        "jump kick": [("paper/90_05_repaired.bvh", (1.0, 1.0, 0.0), 1)],
+        "playground": [("paper/01_03.amc", (0.1, 0.1, 1.0), 0)],
+        "CMU person 14, mean of 5": [
+            (f"cmu/{p.name}", None, 0) for p in sorted((folder / "cmu").glob("14_*.amc"))
+        ],
+        "Bandai Namco, mean of 4": [
+            (f"bandai/{p.name}", None, 0) for p in sorted((folder / "bandai").glob("*.bvh"))
+        ],
+        "Xsens": [(f"xsens/{p.name}", None, 0) for p in sorted((folder / "xsens").glob("*.bvh"))],
+    }
+    lines = [
+        "| recordings | `sik`, limits off | `sik+`, limits off | `sik`, limits on | `sik+`, limits on "
+        "| frames missed, limits on |",
+        "|---|---|---|---|---|---|",
+    ]
+    means = []
+    for name, clips in sets.items():
+        found = np.array([plus_row(folder, *clip) for clip in clips]).mean(axis=0)
+        means.append(found)
+        lines.append(plus_line(name, found))
+        if len(means) == 3:
+            lines.append(plus_line("**average of the paper's**", np.mean(means, axis=0)))
+    return lines
+
+
+def plus_row(folder: Path, file: str, weights: tuple[float, float, float] | None, skip: int) -> list[float]:
+    """Errors of both methods with limits off and on, and the frames that each misses with limits on."""
+    motion = sp.load(folder / file).sliced(slice(skip, None))
+    figure = sp.Figure.from_motion(motion)
+    targets = figure.targets(motion)
+    out: list[float] = []
+    for limits in (False, True):
+        plain = sp.SequentialIK(figure, limits=limits, **({"weights": weights} if weights else {}))
+        for solver in (plain, sp.SequentialIKPlus(figure, limits=limits)):
+            solved = solver.solve_frames(targets)
+            errors = sp.compute_errors(figure, motion, solved.motion)
+            out += [errors.position, errors.orientation, solved.count(sp.Status.UNREACHABLE) / len(motion)]
+    return out
+
+
+def plus_line(name: str, found: np.ndarray) -> str:
+    """One Markdown row."""
+    cells = [f"{found[k]:.4f} / {found[k + 1]:.4f}" for k in (0, 3, 6, 9)]
+    return f"| {name} | {' | '.join(cells)} | {100 * found[8]:.0f} %, {100 * found[11]:.0f} % |"
+
+
 def row(name, missed, free, limited, paper) -> str:
     """One Markdown row; None leaves a cell empty."""
     reached = "" if missed is None else f"{100 * (1 - missed):.0f} %"
@@ -119,7 +169,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=DATA)
     folder = parser.parse_args().data
     text = RESULTS.read_text("utf-8")
-    for mark, make in zip(MARKS, (table, table_pik), strict=True):
+    for mark, make in zip(MARKS, (table, table_pik, table_plus), strict=True):
         lines = make(folder)
         print("\n".join(lines), "\n")
         begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"

@@ -21,7 +21,7 @@ from sixpoint.study.comparison import averages, measures, tables
 from sixpoint.study.comparison.curves import draw_errors, encode, find_turns, has_window
 from sixpoint.study.comparison.model import Claim, ClipRuns, Comparison, Reference, Row, Run
 from sixpoint.study.comparison.poses import draw_poses
-from sixpoint.study.comparison.summary import summarise
+from sixpoint.study.comparison.summary import describe_clip, summarise
 from sixpoint.study.comparison.trade import draw_trade, find_marks
 from sixpoint.study.document import (
     BEST,
@@ -76,7 +76,8 @@ def make_comparison():
             if method == "jt" and lost:
                 rows.append(Row(clip, method, 30, 60.0, error=REASON, failed_frames=30))
             else:
-                rows.append(make_row(clip, method, 100 * c + m, options="limits=True weights=1,1,0" if method == "sik" else ""))
+                options = "limits=True weights=1,1,0" if method == "sik" else ""
+                rows.append(make_row(clip, method, 100 * c + m, options=options))
         clips.append(make_clip(clip, [m for m in METHODS if m != "jt" or not lost]))
     known = [m for m in METHODS if m != "jt"]
     rng = np.random.default_rng(7)
@@ -247,7 +248,6 @@ TIMES = {
     ("whole clip", "best round [µs/frame]"): lambda r: f"{r.batch_us:.1f}",
     ("single calls", "median [µs]"): lambda r: f"{r.median_us:.1f}",
     ("single calls", "p99 [µs]"): lambda r: f"{r.p99_us:.1f}",
-    ("once", "warm-up [s]"): lambda r: f"{r.warm_up_s:.2f}",
 }
 
 
@@ -281,8 +281,6 @@ def test_quality_over_clips(comparison):
     assert column(table, "targets", "worst [mm]")["ccd"] == f"{worst:.1f}"
     worst = np.degrees(max(row.limit_worst for row in rows))
     assert column(table, "limits", "worst excess [°]")["ccd"] == f"{worst:.2f}"
-    times = measures.time_table(comparison)
-    assert column(times, "once", "warm-up [s]")["ccd"] == f"{max(row.warm_up_s for row in rows):.2f}"
     truth = 1000 * (rows[0].skate_truth + rows[1].skate_truth) / 2
     assert column(table, "motion", "foot skate [mm/frame]")["truth"] == f"{truth:.2f}"
     assert column(table, "failed", "frames")["jt"] == "30"
@@ -361,6 +359,60 @@ def test_failures_are_rows_with_their_reason(comparison, folder):
     assert [mark.method for mark in find_marks(comparison)] == ["kma", "ccd", "sik", "pik"]
     assert "jt" not in averages.correlate(comparison, "position").methods
     assert "1 without a result (jt on two)" in summarise(comparison)[0].text
+
+
+def test_a_clip_that_cannot_be_read_is_one_line(comparison):
+    """All methods share its reason, where it is the same; nothing is said of frames it does not have."""
+    lost = [Row("bad", method, 0, nan, error="no such file") for method in METHODS]
+    part = replace(comparison, rows=(*comparison.rows, *lost))
+    assert tables.failure_table(part).rows == (
+        ("two", "jt", "30", "30", REASON),
+        ("bad", "all methods", "–", "–", "no such file"),
+    )
+    other = replace(comparison, rows=(*lost[:-1], replace(lost[-1], error="too late")))
+    assert [row[1] for row in tables.failure_table(other).rows] == list(METHODS)
+    some = replace(comparison, rows=tuple(lost[:-1]))
+    assert [row[1] for row in tables.failure_table(some).rows] == list(METHODS[:-1]), "one was not run"
+    assert describe_clip(part, "bad", None).text == "The clip could not be read."
+    assert describe_clip(part, "one", None).text.startswith("30 frames at 60 Hz. ")
+    assert "nan" not in to_markdown(build_document(replace(part, clips=())))
+
+
+@pytest.mark.parametrize(
+    ("worst", "said"), [(0.0104, ""), (0.0106, "1.1 times as far off"), (0.02, "2.0 times as far off")]
+)
+def test_only_a_notable_ratio_is_said(worst, said):
+    """The least accurate method is named from 1.05 times the best error on."""
+    values = (0.01, 0.0101, 0.0102, 0.0103, worst)
+    rows = tuple(
+        make_row("one", m, k, position=value)
+        for k, (m, value) in enumerate(zip(METHODS, values, strict=True))
+    )
+    text = {p.lead: p.text for p in summarise(Comparison("t", METHODS, rows, ()))}["Position error."]
+    assert ("least accurate" in text) == bool(said)
+    assert said in text
+
+
+def test_a_best_error_of_zero_has_no_ratio():
+    """A method that is exact does not break the summary."""
+    rows = tuple(make_row("one", m, k, position=0.01 * k) for k, m in enumerate(METHODS))
+    text = {p.lead: p.text for p in summarise(Comparison("t", METHODS, rows, ()))}["Position error."]
+    assert "least accurate is pik (0.0400). " in text
+
+
+def test_the_unit_of_positions_is_explained_once(comparison):
+    """Errors are over H, the summed lengths of five segments, which is said where errors are defined."""
+    text = to_markdown(build_document(replace(comparison, clips=())))
+    assert "mean joint distance over H" in text
+    assert "body height" not in text
+    assert text.count("H is the summed length of the figure's calf, thigh, pelvis, torso and neck") == 1
+
+
+def test_times_say_what_they_are_compared_with(comparison):
+    """Ratios are to sik on the same clip, a resumed folder may mix runs; no column charges compilation."""
+    table = measures.time_table(comparison)
+    assert "to sik on the same clip; a folder that was resumed may mix runs" in table.note
+    assert not any("warm" in head for head in table.columns)
 
 
 def test_the_chart_shows_means_and_ratios(comparison):
@@ -502,7 +554,35 @@ def test_reports_are_the_same_twice(tmp_path, comparison):
     assert len(files[0]) == 5
     for first, second in zip(*files, strict=True):
         assert first.read_bytes() == second.read_bytes()
-    assert sorted(p.name for p in again.iterdir()) == ["pictures", "report.html", "report.md"]
+    assert sorted(p.name for p in again.iterdir()) == ["pictures", "report.html", "report.md", "runs"]
+
+
+def test_pictures_of_the_report_before_are_deleted(comparison, tmp_path):
+    """Only those that a report of ours wrote there, and none that the list names elsewhere."""
+    write_report(replace(comparison, methods=("sik",), clips=comparison.clips[:2]), tmp_path)
+    place, listed = tmp_path / "pictures", tmp_path / "runs" / "pictures.txt"
+    first = {path.name for path in place.iterdir()}
+    assert {*listed.read_text().split()} == first
+    kept = [place / "mine.png", tmp_path / "other.png", place / "Note.txt"]
+    for path in kept:
+        path.write_text("mine")
+    (place / "folder.png").mkdir()
+    with listed.open("a") as stream:
+        stream.write("../other.png\nNote.txt\n..\nfolder.png\ngone.png\n")
+    files = write_report(replace(comparison, methods=("sik",), clips=comparison.clips[1:2]), tmp_path)
+    second = {path.name for path in files if path.suffix == ".png"}
+    assert any(name.startswith("one-") for name in first - second)
+    assert {path.name for path in place.iterdir()} == second | {"mine.png", "Note.txt", "folder.png"}
+    assert all(path.read_text() == "mine" for path in kept)
+    assert {*listed.read_text().split()} == second | {"folder.png"}
+
+
+def test_without_a_list_nothing_is_deleted(comparison, tmp_path):
+    """Pictures in the folder are of the user until a report of ours says otherwise."""
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures" / "one-errors.png").write_text("mine")
+    write_report(Comparison("c", (), (), ()), tmp_path)
+    assert (tmp_path / "pictures" / "one-errors.png").read_text() == "mine"
 
 
 def test_one_frame_one_clip_no_reference(tmp_path):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ NAMES = sorted(sp.SOLVERS)
 class Promise:
     """How exactly a method keeps a theorem that others keep to rounding errors.
 
-    Iterative methods stop when they are within 1 cm, or gain less than 1 mm, or after 20 iterations.
+    Iterative methods stop when they are within 1 cm, or gain less than 1 mm, or after 20 iterations. Their
+    numbers are what was measured and about 30 % of margin: of the share of frames, 30 % of what is missing.
     """
 
     met: float = 1e-9
@@ -32,36 +34,97 @@ class Promise:
     """Share of frames in which it is met."""
     rest: float = 1e-12
     """1 - cos(half angle) that the neutral pose may be off."""
+    free: float = 0.0
+    """The same without limits, where that is more."""
     neutral: float = 1e-12
     """Distance that its points may be off [m]."""
-    stretched: float = 1e-6
+    stretched: float = 1e-9
     """How far the unit vector along a stretched limb may be off."""
     settled: int = 1
     """Frames after which a method stands still before a world that no pose can meet."""
-    scaled: float = 1e-5
+    scaled: float = 1e-7
     """Angle by which the pose of a scaled body may differ [rad]: thresholds are in metres."""
-    others: float = 0.03
+    others: float = 4e-6
     """How far off the other points may be while one is lost [m]."""
     alike: float = 0.99
-    """Share of frames of a motion that rounding errors leave alike: a stop rule or a limit may split them."""
+    """Share of frames of a motion that rounding errors leave alike."""
+    split: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Samples where a stop rule or a limit splits more: the share left alike, and that within 1 mm."""
+    upright: bool = False
+    """Whether it knows the vertical, so that the world may turn about that alone."""
 
 
-PRIORITIZED = Promise(met=1.1e-3, rest=5e-3, neutral=1.1e-3, stretched=4e-2, settled=60, scaled=0.02)
+DAMPED = Promise(0.016, 1.0, 0.0215, neutral=0.0055, stretched=0.3, settled=200, scaled=0.012, others=2.3e-3)
 PROMISES = {
     "sik": Promise(),
+    "sik+": Promise(rest=0.038, free=0.046, neutral=1e-9, scaled=2.3e-5, others=1e-9, upright=True),
     "tgbsik": Promise(),
-    "kma": Promise(
-        rest=0.15, neutral=0.01
-    ),  # the estimated pelvis is not the neutral one; CCD bends the spine
-    "ccd": Promise(met=0.04, rest=0.15, neutral=0.01, stretched=1e-3, settled=60, scaled=0.2, alike=0.5),
-    # The Jacobian methods begin with slightly bent limbs.
-    "jt": Promise(0.1, 0.7, 0.02, 0.02, 0.03, settled=200, scaled=0.3, others=0.15, alike=0.2),
-    "pinv": Promise(0.0101, 0.6, 0.02, 0.02, 0.08, settled=60, scaled=0.02, others=0.05),
-    "dls": Promise(0.02, 1.0, 0.02, 0.01, 0.3, settled=200, scaled=0.02),
-    "dls-svd": Promise(0.02, 1.0, 0.02, 0.01, 0.3, settled=200, scaled=0.02),
-    "sdls": Promise(0.0101, 0.95, 0.02, 0.01, 0.03, settled=200, scaled=0.1),
-    "pik": PRIORITIZED,
-    "pik-flext": replace(PRIORITIZED, scaled=0.2),
+    # Rest: CCD, which bends the spine of both from the head, turns its last joint by 36 degrees with limits
+    # and by 59 without, as the estimated pelvis (Y along pelvis to head) is not the neutral one. No margin.
+    "kma": Promise(rest=0.05, free=0.13, neutral=4.6e-3, others=0.012),
+    "ccd": Promise(
+        met=0.04,
+        rest=0.05,
+        free=0.13,
+        neutral=9.2e-3,
+        stretched=3.8e-3,
+        settled=60,
+        scaled=0.26,
+        others=0.0185,
+        split={"reach": (0.5, 0.91)},
+    ),
+    # The Jacobian methods begin with slightly bent limbs: elbows and knees of 20 degrees.
+    "jt": Promise(
+        met=0.1,
+        share=0.85,
+        rest=0.02,
+        neutral=0.02,
+        stretched=0.02,
+        settled=200,
+        scaled=0.275,
+        others=0.066,
+        split={"boxing": (0.2, 0.58)},
+    ),
+    "pinv": Promise(
+        met=0.0101,
+        share=0.72,
+        rest=0.0193,
+        neutral=0.0175,
+        stretched=0.066,
+        settled=60,
+        scaled=1.5e-3,
+        others=8.2e-4,
+    ),
+    "dls": DAMPED,
+    "dls-svd": DAMPED,
+    "sdls": Promise(
+        met=0.0101,
+        share=0.98,
+        rest=0.022,
+        neutral=6.4e-3,
+        stretched=0.0131,
+        settled=200,
+        scaled=2.4e-3,
+        others=8.2e-4,
+    ),
+    "pik": Promise(
+        met=1.1e-3,
+        rest=8.2e-4,
+        neutral=4.7e-4,
+        stretched=0.035,
+        settled=60,
+        scaled=3.3e-3,
+        others=8.9e-4,
+    ),
+    "pik-flext": Promise(
+        met=1.1e-3,
+        rest=4.6e-3,
+        neutral=5.3e-6,
+        stretched=0.015,
+        settled=60,
+        scaled=0.21,
+        others=4.3e-4,
+    ),
 }
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 SWAPPED = [0, 1, 3, 2, 5, 4]
@@ -99,7 +162,8 @@ def test_neutral_points_give_the_neutral_pose(name, limits):
     promise = PROMISES[name]
     solution = sp.make_solver(name, FIGURE, limits=limits).solve(points_of(FIGURE))
     assert solution.status is sp.Status.CONVERGED or promise.neutral > 0.01
-    np.testing.assert_allclose(np.abs(solution.pose.rotations[:, 3]), 1.0, atol=promise.rest)
+    rest = promise.rest if limits else max(promise.rest, promise.free)
+    np.testing.assert_allclose(np.abs(solution.pose.rotations[:, 3]), 1.0, rtol=0, atol=rest)
     np.testing.assert_allclose(solution.residual, 0.0, atol=promise.neutral)
 
 
@@ -179,22 +243,23 @@ def test_mirrored_points_give_the_mirrored_pose(name, limits, clips):
     names = FIGURE.skeleton.names
     other = {"l": "r", "r": "l"}
     twin = [names.index(other[n[0]] + n[1:]) if n[:2] in ("l_", "r_") else names.index(n) for n in names]
-    for _, targets in clips.values():
+    for sample, (_, targets) in clips.items():
         solver = sp.make_solver(name, FIGURE, limits=limits)
         flipped = (targets.positions @ MIRROR)[:, SWAPPED]
         plain = solver.solve_motion(targets).positions
         mirrored = solver.solve_motion(sp.Targets(flipped, targets.rate)).positions
-        assert_alike(name, mirrored[:, twin] @ MIRROR, plain, 1e-9)
+        assert_alike(name, sample, mirrored[:, twin] @ MIRROR, plain, 1e-9)
         alone = as_motion(FIGURE, solver.solve(targets.positions[50])).positions[0]
         there = as_motion(FIGURE, solver.solve(flipped[50])).positions[0]
         np.testing.assert_allclose(there[twin] @ MIRROR, alone, atol=1e-6)
 
 
-def assert_alike(name: str, positions: np.ndarray, expected: np.ndarray, median: float) -> None:
+def assert_alike(name: str, sample: str, positions: np.ndarray, expected: np.ndarray, median: float) -> None:
     """Two motions agree in all frames but those that rounding errors split."""
     gap = np.abs(positions - expected).max(axis=(1, 2))
-    alike = PROMISES[name].alike
+    alike, close = PROMISES[name].split.get(sample, (PROMISES[name].alike,) * 2)
     assert np.mean(gap < 1e-6) > alike
+    assert np.mean(gap < 1e-3) > close
     assert np.median(gap) < median or alike < 0.5
 
 
@@ -202,13 +267,14 @@ def assert_alike(name: str, positions: np.ndarray, expected: np.ndarray, median:
 @pytest.mark.parametrize("vector", [(0, 2.1, 0), (0.4, -1.0, 0.7)])
 def test_a_moved_world_gives_the_moved_pose(name, vector, clips):
     """The same points in another place and orientation give the same pose there."""
+    vector = [0, np.linalg.norm(vector), 0] if PROMISES[name].upright else vector
     turn, shift = Rotation.from_rotvec(vector).as_matrix(), np.array([3.0, -1.0, 2.0])
-    for _, targets in clips.values():
+    for sample, (_, targets) in clips.items():
         solver = sp.make_solver(name, FIGURE, limits=False)
         moved = targets.positions @ turn.T + shift
         plain = solver.solve_motion(targets).positions
         there = solver.solve_motion(sp.Targets(moved, targets.rate)).positions
-        assert_alike(name, there, plain @ turn.T + shift, 1e-7)
+        assert_alike(name, sample, there, plain @ turn.T + shift, 1e-7)
         alone = as_motion(FIGURE, solver.solve(targets.positions[50])).positions[0]
         again = as_motion(FIGURE, solver.solve(moved[50])).positions[0]
         np.testing.assert_allclose(again, alone @ turn.T + shift, atol=1e-6)

@@ -42,6 +42,7 @@ from sixpoint.solvers.prioritized.tasks import (
 )
 from sixpoint.solvers.registry import SOLVERS, make_solver
 from sixpoint.solvers.sequential.solver import SequentialIK
+from sixpoint.solvers.sequential_plus.solver import Habits, SequentialIKPlus
 from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.solvers.tgb.limb import AnalyticLimb
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
@@ -70,6 +71,7 @@ __all__ = [
     "Fixed",
     "FlextTask",
     "FormatError",
+    "Habits",
     "HalfSpace",
     "Hinges",
     "JacobianIK",
@@ -86,6 +88,7 @@ __all__ = [
     "PostureTask",
     "PrioritizedIK",
     "SequentialIK",
+    "SequentialIKPlus",
     "SixpointError",
     "Skeleton",
     "SkeletonError",

@@ -39,8 +39,8 @@ def compare(
     methods: Annotated[
         str | None,
         Parameter(
-            help="`all`, or names with commas: sik, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik, "
-            "pik-flext; `module:Class` for your own."
+            help="`all`, or names with commas: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, "
+            "pik, pik-flext; `module:Class` for your own."
         ),
     ] = None,
     out: Annotated[Path, Parameter(name=("--out", "-o"), help="Folder of the report.")] = Path("report"),

@@ -36,7 +36,7 @@ def reconstruct(
     method: Annotated[
         str,
         Parameter(
-            help="How to solve: sik, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik or pik-flext; "
+            help="How to solve: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik or pik-flext; "
             "`module:Class` for your own."
         ),
     ] = "sik",

@@ -67,18 +67,41 @@ class Screen:
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
-        """A progress bar, shown on a terminal only; yields what jobs report to."""
+        """Progress bars, shown on a terminal only; yields what jobs report to."""
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         bar = Progress(*columns, console=self.err, transient=True, disable=not self.err.is_terminal)
-        tasks: dict[str, TaskID] = {}
-
-        def report(what: str, done: int, total: int) -> None:
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=total)
-            bar.update(tasks[what], completed=done, total=total)
-
         with bar:
-            yield report
+            yield Bars(bar).report
+
+
+class Bars:
+    """The bars of what is under way.
+
+    A finished one goes, unless it is the only one or others began while it ran: that one is of the whole.
+    """
+
+    def __init__(self, bar: Progress) -> None:
+        self.bar = bar
+        self.tasks: dict[str, TaskID] = {}
+        self.finished: set[str] = set()
+        self.whole: set[str] = set()
+
+    def report(self, what: str, done: int, total: int) -> None:
+        """Show how far something is."""
+        if what not in self.tasks:
+            if done >= total and self.tasks:
+                return  # the end of what has no bar, or has it no more
+            self.whole |= self.tasks.keys() - self.finished
+            self.tasks[what] = self.bar.add_task(what, total=total)
+        self.bar.update(self.tasks[what], completed=done, total=total)
+        if done >= total:
+            self.finished.add(what)
+        else:
+            self.finished.discard(what)
+        if len(self.tasks) > 1:
+            for over in self.finished - self.whole:
+                self.bar.remove_task(self.tasks.pop(over))
+                self.finished.discard(over)
 
 
 def _console(*, stderr: bool) -> Console:

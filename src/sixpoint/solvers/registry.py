@@ -17,10 +17,12 @@ from sixpoint.solvers.jacobian.solver import JacobianIK
 from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
 from sixpoint.solvers.sequential.solver import SequentialIK
+from sixpoint.solvers.sequential_plus.solver import SequentialIKPlus
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
 
 SOLVERS: dict[str, Callable[..., Solver]] = {
     "sik": SequentialIK,
+    "sik+": SequentialIKPlus,
     "tgbsik": TGBSequentialIK,
     "kma": KulpaMultonArnaldi,
     "ccd": CyclicCoordinateDescent,

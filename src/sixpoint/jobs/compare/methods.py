@@ -16,6 +16,7 @@ from sixpoint.solvers.registry import SOLVERS, find_solver
 STOP = "stops at 1 cm, at a gain below 1 mm, or after 20 iterations"
 PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "sik": ({}, "closed form; the chord search is exact"),
+    "sik+": ({}, "constants chosen on other people's recordings, see benchmarks/tune_sik_plus.py"),
     "tgbsik": ({}, "weight of twist 1; swivel searched on the whole circle by 0.1, then 0.01 rad"),
     "kma": ({}, f"from the standing pose; swivel angles zero; the spine's CCD {STOP}"),
     "ccd": ({}, f"from tip to root; {STOP}"),

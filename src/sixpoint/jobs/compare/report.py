@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from sixpoint.study.document import Block, Document, Picture
 
 PAGE, TEXT, PICTURES = "report.html", "report.md", "pictures"
+WRITTEN = "runs/pictures.txt"
+"""The names of the pictures of the last report, which the next one may delete."""
 
 DEFINITIONS = (
     (
         "Position error",
-        "In each frame the mean distance of the measured joints to their true places, over the height of the "
-        "figure (calf, thigh, pelvis, torso and neck); of that the root mean square over frames.",
+        "In each frame the mean distance of the measured joints to their true places, over H; of that the "
+        "root mean square over frames. H is the summed length of the figure's calf, thigh, pelvis, torso and "
+        "neck, which is less than its stature.",
     ),
     (
         "Orientation error",
@@ -43,6 +46,8 @@ DEFINITIONS = (
 
 def write_report(comparison: Comparison, folder: Path, progress: Progress = silent) -> list[Path]:
     """Draw a comparison and write ``report.html``, ``report.md`` and ``pictures/``; older ones are replaced.
+
+    Pictures that the report before wrote, and this one has no more, are deleted.
 
     Args:
         comparison: What is reported.
@@ -64,13 +69,37 @@ def write_report(comparison: Comparison, folder: Path, progress: Progress = sile
         folder / TEXT: to_markdown(document, PICTURES).encode(),
         **{folder / PICTURES / picture.name: picture.data for picture in document.pictures},
     }
-    for place in dict.fromkeys(path.parent for path in contents):
+    written = folder / WRITTEN
+    for place in dict.fromkeys(path.parent for path in (*contents, written)):
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FormatError(place, f"the folder cannot be made: {error.strerror}") from error
     write_files(contents, force=True)
+    names = [picture.name for picture in document.pictures]
+    names += _delete_pictures(folder / PICTURES, _read_names(written) - {*names})
+    write_files({written: "".join(f"{name}\n" for name in names).encode()}, force=True)
     return list(contents)
+
+
+def _read_names(written: Path) -> set[str]:
+    """Plain names of PNG files in a list; whatever else it says is left alone."""
+    try:
+        names = written.read_text("utf-8").split("\n")
+    except (OSError, UnicodeDecodeError):
+        return set()
+    return {name for name in names if re.fullmatch(r"[a-z0-9][a-z0-9-]*\.png", name)}
+
+
+def _delete_pictures(folder: Path, names: set[str]) -> list[str]:
+    """Delete files; returns those that could not be."""
+    kept = []
+    for name in sorted(names):
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError:
+            kept.append(name)
+    return kept
 
 
 def build_document(comparison: Comparison, progress: Progress = silent) -> Document:

@@ -34,7 +34,7 @@ LEFT_EDGE, RIGHT_EDGE, BETWEEN = (
     0.62,
     1.06,
 )  # room for names and numbers, between the two columns [inch]
-TITLES = {"position": "position error over height", "orientation": "orientation error [rad]"}
+TITLES = {"position": "position error over H", "orientation": "orientation error [rad]"}
 COLOURS = (*SERIES[:5], "#2f6db3", SERIES[6], "#9a5b3b", "#2b8f74", "#a04fb3", "#6f7f22", "#7a6f8f")
 
 

@@ -73,7 +73,6 @@ TIMES = (
     Measure("whole clip", "best round [µs/frame]", "batch_us", 1.0, 1),
     Measure("single calls", "median [µs]", "median_us", 1.0, 1),
     Measure("single calls", "p99 [µs]", "p99_us", 1.0, 1),
-    Measure("once", "warm-up [s]", "warm_up_s", 1.0, 2, max),
 )
 TRUE = {
     "jerk_ratio": "",
@@ -104,8 +103,8 @@ def quality_table(comparison: Comparison, clip: str | None = None) -> Table:
 def reading_table(comparison: Comparison, clip: str | None = None) -> Table:
     """Other readings of the errors: mean, 95th percentile over frames, and pooled."""
     note = (
-        "Position is over body height. p95: 95th percentile over frames. Pooled: the root of the mean over "
-        "frames of the summed squared joint distances, over the number of joints and the height."
+        "Position is over H. p95: 95th percentile over frames. Pooled: the root of the mean over "
+        "frames of the summed squared joint distances, over the number of joints and H."
     )
     title = "Other readings of the errors" + ("" if clip else ", over all clips")
     return _measures(comparison, READINGS, clip, title, note)
@@ -207,9 +206,9 @@ def time_table(comparison: Comparison, clip: str | None = None) -> Table:
             tuple([*row, number(divide(printed, printed_unit), 2), number(printed, 2)] if known else row)
         )
     note = (
-        "Compiling or loading kernels is warm-up and not contained. Ratios are of whole clips, to "
-        f"{base} in the same run; single calls contain Python's share. Means over the clips; of warm-ups the "
-        "longest. The reference's are medians of its C++."
+        f"Compiling or loading kernels is not contained. Ratios are of whole clips, to {base} on the same "
+        "clip; a folder that was resumed may mix runs. Single calls contain Python's share. Means over the "
+        "clips. The reference's are medians of its C++."
     )
     title = "Time" if clip else ALL
     return Table(title, tuple(columns), tuple(rows), tuple(groups), note="" if clip else note)

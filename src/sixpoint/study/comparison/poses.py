@@ -50,7 +50,7 @@ def draw_poses(clip: ClipRuns, methods: Sequence[str], missing: Mapping[str, str
     add_heading(
         canvas,
         f"{plain(clip.name)}: all methods at frame {clip.frame}",
-        "position error over height, orientation error",
+        "position error over H, orientation error",
     )
     legend = ((GHOST, "truth"), (LEFT, "left side"), (RIGHT, "right side"), (INK, "six points"))
     add_legend(canvas, (*legend, (SOFT, "hollow: joints of the true trunk")))

@@ -21,6 +21,8 @@ from sixpoint.study.comparison.curves import TURN, find_turns
 from sixpoint.study.comparison.model import ClipRuns, Comparison
 from sixpoint.study.document import Paragraph
 
+NOTABLE = 1.05
+"""A ratio below is not worth a word."""
 UNITS = {"position": "", "orientation": " rad"}
 
 
@@ -34,7 +36,7 @@ def summarise(comparison: Comparison) -> tuple[Paragraph, ...]:
 
 def _describe_runs(comparison: Comparison) -> Paragraph:
     clips, rows = clip_names(comparison), comparison.rows
-    lengths = {row.clip: row.frames for row in rows}
+    lengths = {row.clip: row.frames for row in rows if row.frames}
     text = (
         f"{count_of(len(comparison.methods), 'method')} on {count_of(len(clips), 'clip')} "
         f"({count_of(sum(lengths.values()), 'frame')}): {count_of(len(rows), 'run')}, "
@@ -59,8 +61,10 @@ def _describe_best(comparison: Comparison, quantity: str) -> Paragraph:
     text = f"{named[0]} is the most accurate"
     if len(named) > 1:
         text += f", then {list_names(named[1:3])}"
-    if len(named) > 3:
-        text += f"; the least accurate is {named[-1]}, {order[-1][0] / order[0][0]:.1f} times as far off"
+    ratio = divide(order[-1][0], order[0][0])
+    if len(named) > 3 and not ratio < NOTABLE:
+        text += f"; the least accurate is {named[-1]}"
+        text += f", {ratio:.1f} times as far off" if isfinite(ratio) else ""
     return Paragraph(
         f"{text}. Means over {list_names(averaged_clips(comparison))}.", f"{quantity.capitalize()} error."
     )
@@ -76,7 +80,7 @@ def _describe_times(comparison: Comparison) -> Paragraph:
     if len(order) > 1:
         text += f", and {order[-1][0]:.1f} µs with {order[-1][1]}, the slowest"
         ratio = divide(order[-1][0], values.get(base, float("nan")))
-        text += f", which is {ratio:.1f} times {base}" if isfinite(ratio) and order[-1][1] != base else ""
+        text += f", which is {ratio:.1f} times {base}" if ratio >= NOTABLE and order[-1][1] != base else ""
     return Paragraph(f"{text}.", "Time.")
 
 
@@ -125,8 +129,9 @@ def describe_clip(comparison: Comparison, clip: str, runs: ClipRuns | None) -> P
     """Length, weights, and how much larger the baseline's error is while the pelvis turns around."""
     rows = [row for row in comparison.rows if row.clip == clip]
     text = []
-    if rows:
-        text.append(f"{count_of(rows[0].frames, 'frame')} at {rows[0].rate:g} Hz.")
+    read = next((row for row in rows if row.frames), None)
+    if read is not None:
+        text.append(f"{count_of(read.frames, 'frame')} at {read.rate:g} Hz.")
     words = [word for row in rows for word in row.options.split()]
     weights = {word.removeprefix("weights=") for word in words if word.startswith("weights=")}
     if len(weights) == 1:

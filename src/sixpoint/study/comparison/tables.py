@@ -1,6 +1,6 @@
 """The tables of errors: Table 1 of the paper beside ours, statements, failures. All are plain text cells.
 
-Every number is one of a row's, of the reference's, or a mean over clips that ``comparison_averages`` defines.
+Every number is one of a row's, of the reference's, or a mean over clips that ``averages`` defines.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from sixpoint.study.comparison.averages import (
     published,
     published_average,
 )
-from sixpoint.study.comparison.measures import OURS, THEIRS, describe_missing, number
-from sixpoint.study.comparison.model import Comparison
+from sixpoint.study.comparison.measures import NONE, OURS, THEIRS, describe_missing, number
+from sixpoint.study.comparison.model import Comparison, Row
 from sixpoint.study.document import BAD, BEST, GOOD, NEXT, Table
 
 ROUNDING = 1.1e-4  # of a mean of three numbers of four digits, and of the printed mean
@@ -59,7 +59,7 @@ def error_table(comparison: Comparison, quantity: str) -> Table:
             ratios = [number(divide(*pair), 2) for pair in zip(values, theirs, strict=True)]
             columns.append(_Column("average", f"{OURS} / {THEIRS}", ratios, ranked=False))
     ranks = [_best(column.cells) if column.ranked else {} for column in columns]
-    kind = "mean joint distance over body height" if quantity == "position" else "mean joint angle"
+    kind = "mean joint distance over H" if quantity == "position" else "mean joint angle"
     return Table(
         title=f"{quantity.capitalize()} error: RMS over frames of the {kind}",
         columns=("method", *(column.head for column in columns)),
@@ -116,14 +116,25 @@ def _best(cells: Sequence[str]) -> dict[int, str]:
 
 
 def failure_table(comparison: Comparison) -> Table | None:
-    """Every run that failed, wholly or on some frames, with its reason; None if there is none."""
-    rows = [
-        (row.clip, row.method, f"{row.failed_frames}", f"{row.frames}", row.error or PARTLY)
-        for row in comparison.rows
-        if row.error or row.failed_frames
-    ]
+    """Every run that failed, wholly or on some frames, with its reason; None if there is none.
+
+    Where all methods failed on a clip for one reason, they share a line.
+    """
+    lines: list[tuple[str, ...]] = []
+    for clip in clip_names(comparison):
+        rows = [row for row in comparison.rows if row.clip == clip]
+        reasons = {row.method: _explain(row) for row in rows if row.error or row.failed_frames}
+        if len(reasons) == len(comparison.methods) > 1 and rows[0].error and len({*reasons.values()}) == 1:
+            reasons = {"all methods": _explain(rows[0])}
+        lines += [(clip, method, *reason) for method, reason in reasons.items()]
     columns = ("clip", "method", "frames failed", "of", "reason")
-    return Table("", columns, tuple(rows), prose=True) if rows else None
+    return Table("", columns, tuple(lines), prose=True) if lines else None
+
+
+def _explain(row: Row) -> tuple[str, str, str]:
+    """How many frames failed, of how many, and why; a clip that could not be read has none."""
+    counts = (f"{row.failed_frames}", f"{row.frames}") if row.frames else (NONE, NONE)
+    return (*counts, row.error or PARTLY)
 
 
 def claim_table(comparison: Comparison) -> Table:

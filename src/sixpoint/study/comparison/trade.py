@@ -96,7 +96,7 @@ def draw_trade(comparison: Comparison) -> Canvas | None:
     places = np.array([place for mark in marks for place in (mark.place, mark.published) if place])
     times, errors = places.T
     unit = f"time of a frame, as a ratio to {base}" if ratio else "time of a frame [µs]"
-    style_axes(axes, times, "position error over height", unit)
+    style_axes(axes, times, "position error over H", unit)
     axes.set(xscale="log", yscale="log")
     axes.set_xlim(times.min() / 1.5, times.max() * 1.5)
     axes.set_ylim(errors.min() / 1.25, errors.max() * 1.25)

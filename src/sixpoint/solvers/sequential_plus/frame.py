@@ -1,0 +1,154 @@
+"""One frame of SIK+: pelvis, trunk, clavicles, limbs, in closed form but for the trunk's few Newton steps.
+
+In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
+5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s]; the fourth numbers of the
+first four rows are the swivel angles of the limbs [rad].
+"""
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.sequential.frame import place_arm, place_leg
+from sixpoint.solvers.sequential.packing import unpack_work
+from sixpoint.solvers.sequential.spine import chord_of, place_trunk
+from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
+from sixpoint.solvers.sequential_plus.packing import unpack_settings
+from sixpoint.solvers.sequential_plus.pelvis import estimate_y, tell_x
+from sixpoint.solvers.sequential_plus.trunk import close_trunk, start_trunk, twist_to_wrists
+from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, judge, write_frame
+from sixpoint.solvers.six_points.packing import limb_row, unpack_model
+
+CHEST = 0.75  # height of the chest's point between pelvis and head
+TOLD = 0.02  # m, lines that tell less than this tell nothing
+RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
+TWIST = 0.8  # rad, largest twist of the thorax
+DAMPING = 1e-6  # m^2, of the trunk's Newton steps
+ALIGN = 1e-3  # m, a trunk that stays farther off turns as a whole
+
+
+@helper
+def estimate_pelvis(filled, memory, s):
+    """X and Y axes of the pelvis; updates what is remembered of X."""
+    pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
+    began = memory[4, 0] > 0.0
+    chord = vec.unit(vec.sub(head, pelvis))
+    if vec.norm(chord) < 0.5:
+        chord = vec.load(memory, 5) if began else (0.0, 1.0, 0.0)
+    y = estimate_y(filled, chord, s.chord_share, s.leg_share)
+    chest = vec.madd(pelvis, CHEST, vec.sub(head, pelvis))
+    velocity = vec.load(memory, 6)
+    if began and filled[0, 3] > 0.0:
+        now = vec.scale(s.rate, vec.sub(pelvis, vec.load(memory, 2)))
+        if vec.norm(now) > RUN:
+            now = vec.scale(RUN / vec.norm(now), now)
+        velocity = vec.add(vec.scale(s.kept_speed, velocity), vec.scale(1.0 - s.kept_speed, now))
+    vec.store(memory, 6, velocity)
+    told = tell_x(filled, y, chest, velocity, s.wrist_line, s.ankle_line, s.reach, s.speed)
+    if memory[4, 1] > 0.0:
+        told = vec.add(vec.scale(s.kept, vec.load(memory, 1)), vec.scale(1.0 - s.kept, told))
+    x = vec.reject(told, y)
+    if vec.norm(x) >= TOLD:
+        memory[4, 1] = 1.0
+    else:
+        x = vec.reject(vec.load(memory, 0) if began else (1.0, 0.0, 0.0), y)
+        if vec.norm(x) < 0.1:
+            x = vec.reject((0.0, 0.0, -1.0), y)
+    vec.store(memory, 1, told)
+    return vec.unit(x), y, chord
+
+
+@helper
+def pose_trunk(model, s, filled, local, memory, world, segs, flat, residual):
+    """Pelvis and spine; returns the place of the pelvis."""
+    pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
+    x, y, chord = estimate_pelvis(filled, memory, s)
+    qt.store(local, 0, qt.from_axes(x, y, vec.cross(x, y)))
+    goal = vec.sub(head, pelvis)
+    wanted = vec.norm(goal)
+    twist = twist_to_wrists(filled, x, chord, s.twist_share, TWIST)
+    start_trunk(model.segments, wanted, twist, s.bend_share, s.neck_curve, local, world, segs, flat)
+    off = close_trunk(model.segments, model.balls, s.limits, goal, DAMPING, s.low_joint, local, world, segs)
+    if off > ALIGN:  # out of reach of the spine: the pelvis turns along, and pelvis and head share the rest
+        turn = qt.arc(vec.unit(chord_of(segs)), chord, x)
+        qt.store(local, 0, qt.normalised(qt.mul(turn, qt.load(local, 0))))
+        place_trunk(model.segments, local, world, segs)
+        close_trunk(model.segments, model.balls, s.limits, goal, DAMPING, s.low_joint, local, world, segs)
+    missed = vec.sub(goal, chord_of(segs))
+    root = vec.madd(pelvis, 0.5, missed)
+    top = vec.add(root, chord_of(segs))
+    vec.store(memory, 0, x)
+    vec.store(memory, 2, root)
+    vec.store(memory, 3, top)
+    vec.store(memory, 5, chord)
+    memory[4, 0] = 1.0
+    residual[0] = vec.norm(vec.sub(pelvis, root)) if filled[0, 3] > 0.0 else 0.0
+    residual[1] = vec.norm(vec.sub(head, top)) if filled[1, 3] > 0.0 else 0.0
+    return root
+
+
+@helper
+def solve_frame(model, s, points, local, memory, residual, scratch):
+    """Solve one frame; returns the status."""
+    world, segs, filled = scratch.world, scratch.segs, scratch.filled
+    lost = fill_lost(points, filled, memory, model.chords[0])
+    root = pose_trunk(model, s, filled, local, memory, world, segs, scratch.flat, residual)
+    for limb in range(4):
+        residual[limb + 2] = 0.0
+        if filled[limb + 2, 3] == 0.0:
+            continue
+        target, side = vec.load(filled, limb + 2), 1.0 if limb % 2 == 0 else -1.0
+        if limb < 2:
+            frame, place = place_arm(
+                model.chest,
+                model.girdle,
+                model.clavicles,
+                model.limbs,
+                model.balls,
+                s.limits,
+                False,
+                limb,
+                root,
+                target,
+                world,
+                segs,
+                local,
+            )
+        else:
+            frame, place = place_leg(model.hips, limb - 2, root, world)
+        gap = qt.inv_mul_vec(frame, vec.sub(target, place))
+        if limb < 2:
+            pole = arm_pole(side, vec.unit(gap), s.elbow_out, s.elbow_down, s.elbow_back, s.elbow_lift)
+        else:
+            pole = leg_pole(side, s.knee_out)
+        row = limb_row(segs.shape[0], limb)
+        upper, hinge, end, memory[limb, 3] = solve_by_pole(
+            gap,
+            model.limbs[limb, 0],
+            model.limbs[limb, 1],
+            -1.0 if limb < 2 else 1.0,
+            pole,
+            memory[limb, 3],
+            s.limits,
+            model.balls,
+            row,
+            model.limbs[limb, 2],
+            model.limbs[limb, 3],
+        )
+        end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
+    return judge(lost, residual)
+
+
+@entry
+def solve_plus(
+    table, integers, balls, chords, work, options, points, state, rotations, pelvis, outcome, residual
+):
+    """Solve F frames in order; see ``SixPointSolver``."""
+    model = unpack_model(table, integers, balls, chords)
+    s = unpack_settings(options)
+    scratch = unpack_work(work, model.segments.shape[0])
+    rows = state.shape[0] - MEMORY_ROWS
+    local, memory = state[:rows], state[rows:]
+    for f in range(points.shape[0]):
+        outcome[f, 0] = solve_frame(model, s, points[f], local, memory, residual[f], scratch)
+        outcome[f, 1] = 1
+        write_frame(model, local, memory, rotations[f], pelvis[f])
