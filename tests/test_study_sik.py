@@ -251,13 +251,13 @@ def test_a_missing_recording_is_named_before_any_work(tmp_path):
 
 
 def test_recordings_are_found_where_they_are_kept(tmp_path):
-    """In paper/, where the kick has an added T-pose, or side by side as they are fetched."""
+    """Side by side as they are fetched, else in paper/, where the kick has an added T-pose."""
     (tmp_path / "paper").mkdir()
-    (tmp_path / "90_05.amc").touch()
-    assert find_recording(None, CLIPS[1]) is None
-    assert find_recording(tmp_path, CLIPS[1]) == (tmp_path / "90_05.amc", 0)
     (tmp_path / "paper" / "90_05_repaired.bvh").touch()
+    assert find_recording(None, CLIPS[1]) is None
     assert find_recording(tmp_path, CLIPS[1]) == (tmp_path / "paper" / "90_05_repaired.bvh", 1)
+    (tmp_path / "90_05.amc").touch()
+    assert find_recording(tmp_path, CLIPS[1]) == (tmp_path / "90_05.amc", 0)
 
 
 @pytest.mark.parametrize("clip", CLIPS, ids=[clip.trial for clip in CLIPS])

@@ -31,7 +31,7 @@ class Row:
         options: Options that the solver was made with, as ``limits=True weights=1,1,0``.
         error: Why there is no result; empty where there is one.
         failed_frames: Frames for which the method raised or gave numbers that are not finite.
-        position: RMS over frames of the mean joint distance over the figure's height, E_p.
+        position: RMS over frames of the mean joint distance over H, E_p; see ``Figure.height``.
         orientation: RMS over frames of the mean joint angle, E_o [rad].
         position_mean: Mean over frames of e_p(t).
         position_p95: 95th percentile of e_p(t).
