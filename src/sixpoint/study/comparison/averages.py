@@ -127,13 +127,13 @@ def _same_clips(comparison: Comparison) -> bool:
 
 
 def correlate(comparison: Comparison, quantity: str) -> Correlation:
-    """Spearman's rank correlation of our averages with the reference's."""
+    """Spearman's rank correlation of our averages with the reference's; what differs by rounding ties."""
     pairs = {
         method: (average(comparison, method, quantity), published_average(comparison, quantity, method))
         for method in comparison.methods
     }
     pairs = {method: pair for method, pair in pairs.items() if all(map(isfinite, pair))}
-    ours, theirs = ([pair[k] for pair in pairs.values()] for k in (0, 1))
+    ours, theirs = ([round(pair[k], 9) for pair in pairs.values()] for k in (0, 1))
     if len(pairs) < 3 or len({*ours}) == 1 or len({*theirs}) == 1:
         return Correlation(tuple(pairs), nan)
     return Correlation(tuple(pairs), float(spearmanr(ours, theirs).statistic))
