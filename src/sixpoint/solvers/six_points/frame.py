@@ -1,9 +1,10 @@
 """How a frame of six points begins and ends, whatever the method.
 
 State between frames is one array (rows + 7, 4): ``local`` (rows, 4) are the anatomical local rotations of
-the posed joints and ``memory`` (7, 4) holds the estimated X axis, the bending plane's normal (zero if none),
-the positions of pelvis and head, whether there was a frame before and whether the X axis was ever told by
-wrists or ankles, the estimated Y axis, and a row for what a method remembers beside.
+the posed joints (as many as ``Model.balls`` has rows) and ``memory`` (7, 4) holds the estimated X axis, the
+bending plane's normal (zero if none), the positions of pelvis and head, whether there was a frame before and
+whether the X axis was ever told by wrists or ankles, the estimated Y axis, and a row for what a method
+remembers beside.
 """
 
 from sixpoint.kernels import quaternion as qt

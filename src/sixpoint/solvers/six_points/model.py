@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges, SwingTwist
-from sixpoint.body.figure import Figure, SpineChain
+from sixpoint.body.figure import COINCIDENT, Figure, SpineChain
 from sixpoint.kernels.swing_twist import build_ball_rows
 from sixpoint.solvers.six_points.packing import STRETCH_POSES, Model
 
@@ -15,10 +15,16 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def build_model(figure: Figure, chain: SpineChain | None = None) -> Model:
-    """Lower a figure; its trunk is ``figure.spine_chain`` unless another is given."""
+def build_model(figure: Figure, chain: SpineChain | None = None, *, ends: bool = False) -> Model:
+    """Lower a figure.
+
+    Args:
+        figure: What is posed.
+        chain: Its trunk; ``figure.spine_chain`` by default.
+        ends: Whether head, wrists and ankles have rows too.
+    """
     roles, chain = figure.roles, chain or figure.spine_chain
-    joints = (*chain.joints, *_limb_joints(figure))
+    joints = (*chain.joints, *_limb_joints(figure), *(_end_joints(figure) if ends else ()))
     segments = chain.segments
     share = 1.0 - 2.0 * np.arange(len(segments)) / max(len(segments) - 1, 1)  # eq. 1, summed along the chain
     turns, chords = _stretch_poses(segments)
@@ -79,6 +85,13 @@ def _limb_joints(figure: Figure) -> tuple[int, ...]:
     """Rig joints of the limb rows; -1 for clavicles the rig lacks."""
     r = figure.roles
     return (*(r.clavicle or (-1, -1)), *r.shoulder, *r.elbow, *r.hip, *r.knee)
+
+
+def _end_joints(figure: Figure) -> tuple[int, ...]:
+    """Rig joints of the end rows; -1 for a head that is an end site, which its trunk joint turns."""
+    r = figure.roles
+    head = -1 if np.linalg.norm(figure.head_offset) > COINCIDENT else r.head
+    return (head, *r.wrist, *r.ankle)
 
 
 def _limit(figure: Figure, joint: int) -> SwingTwist | None:

@@ -1,7 +1,8 @@
 """What compiled methods of six points read, and how it crosses from Python in few arrays.
 
 Posed joints are rows of one array of anatomical local rotations: the S trunk joints, then ten limb joints
-(clavicles, shoulders, elbows, hips, knees; left before right).
+(clavicles, shoulders, elbows, hips, knees; left before right). Methods that turn the extremities have five
+rows more, the ends: head, wrists, ankles.
 """
 
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from sixpoint.kernels.jit import helper
 
 LIMB_ROWS = 10
+END_ROWS = 5
 STRETCH_POSES = 33
 
 
@@ -39,7 +41,8 @@ class Model(NamedTuple):
         chords: (33,) chord length of the precomputed stretch poses, not decreasing [m]; the first is the
             neutral pose's.
         chest: (2,) trunk joint that carries each arm.
-        row: (J,) posed row of each rig joint, -1 for joints that keep their neutral rotation.
+        row: (J,) posed row of each rig joint, -1 for joints that keep their neutral rotation. The head has no
+            row of its own where it is an end site: its trunk joint turns it.
     """
 
     segments: np.ndarray
@@ -96,3 +99,9 @@ def unpack_model(table, integers, balls, chords):
 def limb_row(segments, limb):
     """Row of a limb's root joint: 0 and 1 are the arms, 2 and 3 the legs; its hinge is two rows on."""
     return segments + 2 + limb if limb < 2 else segments + 4 + limb
+
+
+@helper
+def end_row(segments, end):
+    """Row of an extremity: 0 the head, 1 and 2 the wrists, 3 and 4 the ankles."""
+    return segments + LIMB_ROWS + end

@@ -67,7 +67,7 @@ class SixPointSolver(ABC):
         model = self._build_model()
         self._arrays = self._lower(model)
         self._trunk = len(model.segments)
-        self._start = np.zeros((self._trunk + LIMB_ROWS + MEMORY_ROWS, 4))
+        self._start = np.zeros((len(model.balls) + MEMORY_ROWS, 4))
         self._start[:-MEMORY_ROWS] = rot.IDENTITY
         self._adapted: dict[float, Array] = {}
 
