@@ -12,11 +12,12 @@ from sixpoint.solvers.sequential.frame import place_arm, place_leg
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
+from sixpoint.solvers.sequential_plus.measured import is_measured, lean_to_head, pole_of_end, turn_end
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
 from sixpoint.solvers.sequential_plus.pelvis import estimate_y, tell_x
 from sixpoint.solvers.sequential_plus.trunk import close_trunk, start_trunk, twist_to_wrists
 from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, judge, write_frame
-from sixpoint.solvers.six_points.packing import limb_row, unpack_model
+from sixpoint.solvers.six_points.packing import end_row, limb_row, unpack_model
 
 CHEST = 0.75  # height of the chest's point between pelvis and head
 TOLD = 0.02  # m, lines that tell less than this tell nothing
@@ -58,21 +59,65 @@ def estimate_pelvis(filled, memory, s):
 
 
 @helper
-def pose_trunk(model, s, filled, local, memory, world, segs, flat, residual):
+def close_on_head(model, s, goal, turned, pinned, local, world, segs):
+    """Bring the head to its goal; returns how far it is off [m].
+
+    A head that is an end site and whose rotation is measured (``pinned``) has its joint rotated so; the
+    spine below reaches where that puts the joint.
+    """
+    segments, balls = model.segments, model.balls
+    hold = s.head_hold if is_measured(turned, 1) else 0.0
+    if pinned:
+        last = segments.shape[0] - 1
+        there = vec.sub(goal, qt.mul_vec(qt.load(turned, 1), vec.load(segments, last)))
+        close_trunk(
+            segments[:last],
+            balls,
+            s.limits,
+            there,
+            DAMPING,
+            s.low_joint,
+            hold,
+            local,
+            world[:last],
+            segs[:last],
+        )
+        could = turn_end(last, qt.load(world, last - 1), turned, 1, s.limits, balls, local)
+        place_trunk(segments, local, world, segs)
+        off = vec.norm(vec.sub(goal, chord_of(segs)))
+        if could and off <= ALIGN:
+            return off
+    return close_trunk(segments, balls, s.limits, goal, DAMPING, s.low_joint, hold, local, world, segs)
+
+
+@helper
+def pose_trunk(model, s, filled, turned, local, memory, world, segs, flat, residual):
     """Pelvis and spine; returns the place of the pelvis."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
     qt.store(local, 0, qt.from_axes(x, y, vec.cross(x, y)))
+    twist_share, bend_share = s.twist_share, s.bend_share
+    held = is_measured(turned, 0)
+    if held:
+        qt.store(local, 0, qt.load(turned, 0))
+        x = qt.x_axis(qt.load(turned, 0))
+        twist_share, bend_share = s.known_twist, s.known_bend
     goal = vec.sub(head, pelvis)
     wanted = vec.norm(goal)
-    twist = twist_to_wrists(filled, x, chord, s.twist_share, TWIST)
-    start_trunk(model.segments, wanted, twist, s.bend_share, s.neck_curve, local, world, segs, flat)
-    off = close_trunk(model.segments, model.balls, s.limits, goal, DAMPING, s.low_joint, local, world, segs)
-    if off > ALIGN:  # out of reach of the spine: the pelvis turns along, and pelvis and head share the rest
+    twist = twist_to_wrists(filled, x, chord, twist_share, TWIST)
+    start_trunk(model.segments, wanted, twist, bend_share, s.neck_curve, local, world, segs, flat)
+    pinned = False
+    if is_measured(turned, 1):
+        relative = qt.inv_mul(qt.load(local, 0), qt.load(turned, 1))
+        lean_to_head(model.segments, relative, twist, s.head_twist, s.head_bend, s.head_rise, local)
+        place_trunk(model.segments, local, world, segs)
+        pinned = s.head_site and segs.shape[0] > 1
+    off = close_on_head(model, s, goal, turned, pinned, local, world, segs)
+    if off > ALIGN and not held:  # out of reach of the spine: the pelvis turns, pelvis and head share the rest
         turn = qt.arc(vec.unit(chord_of(segs)), chord, x)
         qt.store(local, 0, qt.normalised(qt.mul(turn, qt.load(local, 0))))
         place_trunk(model.segments, local, world, segs)
-        close_trunk(model.segments, model.balls, s.limits, goal, DAMPING, s.low_joint, local, world, segs)
+        close_on_head(model, s, goal, turned, pinned, local, world, segs)
     missed = vec.sub(goal, chord_of(segs))
     root = vec.madd(pelvis, 0.5, missed)
     top = vec.add(root, chord_of(segs))
@@ -87,16 +132,35 @@ def pose_trunk(model, s, filled, local, memory, world, segs, flat, residual):
 
 
 @helper
-def solve_frame(model, s, points, local, memory, residual, scratch):
+def point_limb(s, limb, n, frame, turned):
+    """Direction of elbow or knee in the frame of what carries the limb; ``n`` is the limb's line there."""
+    side = 1.0 if limb % 2 == 0 else -1.0
+    if limb < 2:
+        pole = arm_pole(side, n, s.elbow_out, s.elbow_down, s.elbow_back, s.elbow_lift)
+    else:
+        pole = leg_pole(side, s.knee_out)
+    if not is_measured(turned, limb + 2):
+        return pole
+    end = qt.inv_mul(frame, qt.load(turned, limb + 2))
+    if limb < 2:
+        return pole_of_end(n, pole, end, side, s.elbow_hand, s.elbow_palm, s.elbow_grip, s.elbow_tilt)
+    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, s.knee_foot, s.knee_tilt)
+
+
+@helper
+def solve_frame(model, s, points, turned, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
+    count = segs.shape[0]
     lost = fill_lost(points, filled, memory, model.chords[0])
-    root = pose_trunk(model, s, filled, local, memory, world, segs, scratch.flat, residual)
+    root = pose_trunk(model, s, filled, turned, local, memory, world, segs, scratch.flat, residual)
+    if turned.shape[0] > 0 and not s.head_site:
+        turn_end(end_row(count, 0), qt.load(world, count - 1), turned, 1, s.limits, model.balls, local)
     for limb in range(4):
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
             continue
-        target, side = vec.load(filled, limb + 2), 1.0 if limb % 2 == 0 else -1.0
+        target = vec.load(filled, limb + 2)
         if limb < 2:
             frame, place = place_arm(
                 model.chest,
@@ -116,17 +180,13 @@ def solve_frame(model, s, points, local, memory, residual, scratch):
         else:
             frame, place = place_leg(model.hips, limb - 2, root, world)
         gap = qt.inv_mul_vec(frame, vec.sub(target, place))
-        if limb < 2:
-            pole = arm_pole(side, vec.unit(gap), s.elbow_out, s.elbow_down, s.elbow_back, s.elbow_lift)
-        else:
-            pole = leg_pole(side, s.knee_out)
-        row = limb_row(segs.shape[0], limb)
+        row = limb_row(count, limb)
         upper, hinge, end, memory[limb, 3] = solve_by_pole(
             gap,
             model.limbs[limb, 0],
             model.limbs[limb, 1],
             -1.0 if limb < 2 else 1.0,
-            pole,
+            point_limb(s, limb, vec.unit(gap), frame, turned),
             memory[limb, 3],
             s.limits,
             model.balls,
@@ -135,20 +195,40 @@ def solve_frame(model, s, points, local, memory, residual, scratch):
             model.limbs[limb, 3],
         )
         end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
+        if turned.shape[0] > 0:
+            above = qt.mul(qt.mul(frame, upper), hinge)
+            turn_end(end_row(count, limb + 1), above, turned, limb + 2, s.limits, model.balls, local)
     return judge(lost, residual)
 
 
 @entry
 def solve_plus(
-    table, integers, balls, chords, work, options, points, state, rotations, pelvis, outcome, residual
+    table,
+    integers,
+    balls,
+    chords,
+    work,
+    options,
+    points,
+    turned,
+    state,
+    rotations,
+    pelvis,
+    outcome,
+    residual,
 ):
-    """Solve F frames in order; see ``SixPointSolver``."""
+    """Solve F frames in order; see ``SixPointSolver``.
+
+    ``turned`` (F, 6, 4) are measured world rotations, NaN where there is none, or (F, 0, 4).
+    """
     model = unpack_model(table, integers, balls, chords)
     s = unpack_settings(options)
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(model, s, points[f], local, memory, residual[f], scratch)
+        outcome[f, 0] = solve_frame(
+            model, s, points[f], turned[f], local, memory, residual[f], scratch
+        )
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])

@@ -6,12 +6,13 @@ from sixpoint.kernels.jit import helper
 
 
 class Settings(NamedTuple):
-    """Whether limits hold, the constants (see ``solver.Habits``), and what follows from the frame time.
+    """Whether limits hold, the constants (see ``solver.Habits``), and what follows from frame time and figure.
 
     Attributes:
         kept: Share of what told X that is kept over the frame.
         kept_speed: Share of the velocity that is kept over the frame.
         rate: Frames per second; 0 where no time passed [Hz].
+        head_site: Whether the head is an end site, turned by the last trunk joint.
     """
 
     limits: bool
@@ -30,9 +31,24 @@ class Settings(NamedTuple):
     elbow_back: float
     elbow_lift: float
     knee_out: float
+    known_twist: float
+    known_bend: float
+    head_twist: float
+    head_bend: float
+    head_rise: float
+    head_hold: float
+    elbow_hand: float
+    elbow_palm: float
+    elbow_grip: float
+    elbow_tilt: float
+    knee_shank: float
+    knee_toes: float
+    knee_foot: float
+    knee_tilt: float
     kept: float
     kept_speed: float
     rate: float
+    head_site: bool
 
 
 @helper
@@ -58,4 +74,19 @@ def unpack_settings(options):
         options[16],
         options[17],
         options[18],
+        options[19],
+        options[20],
+        options[21],
+        options[22],
+        options[23],
+        options[24],
+        options[25],
+        options[26],
+        options[27],
+        options[28],
+        options[29],
+        options[30],
+        options[31],
+        options[32],
+        options[33] > 0.0,
     )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.errors import SixpointError
+from sixpoint.body.figure import COINCIDENT, Figure, SpineChain
+from sixpoint.body.targets import EFFECTORS, Targets, as_points
+from sixpoint.errors import SixpointError, TargetError, listed
+from sixpoint.solvers.base import Solution
 from sixpoint.solvers.sequential.packing import work_rows
 from sixpoint.solvers.sequential_plus.frame import solve_plus
 from sixpoint.solvers.six_points.model import build_model
@@ -43,6 +46,20 @@ class Habits:
         elbow_back: Its backward part.
         elbow_lift: What is added outward when the hand is overhead.
         knee_out: Outward part of a knee's direction; forward it is one.
+        known_twist: ``twist_share`` where the pelvis' rotation is measured.
+        known_bend: ``bend_share`` where it is.
+        head_twist: Share of the head's measured twist that the top of the spine takes.
+        head_bend: Share of its bend.
+        head_rise: Power of the height by which lower joints take less of both.
+        head_hold: Share of the spine's turn at the top that closing on the head avoids, 0 to 1.
+        elbow_hand: How much an elbow points along the hand, towards the forearm.
+        elbow_palm: How much it points to the front of the hand's neutral pose, where the thumb is.
+        elbow_grip: How much the elbow's axis follows the hand's lateral one.
+        elbow_tilt: How much it follows the hand's long axis.
+        knee_shank: How much a knee points along the foot's vertical axis.
+        knee_toes: How much it points where the toes do.
+        knee_foot: How much the knee's axis follows the foot's lateral one.
+        knee_tilt: How much it follows the foot's vertical axis.
         memory: Time constant of what tells the pelvis' X axis [s].
         speed_memory: Time constant of the pelvis' velocity [s].
     """
@@ -62,6 +79,20 @@ class Habits:
     elbow_back: float = 0.6
     elbow_lift: float = 1.05
     knee_out: float = 0.0
+    known_twist: float = 0.225
+    known_bend: float = 0.1
+    head_twist: float = 0.8
+    head_bend: float = 0.5
+    head_rise: float = 2.0
+    head_hold: float = 0.3
+    elbow_hand: float = 0.5
+    elbow_palm: float = -0.25
+    elbow_grip: float = 0.5
+    elbow_tilt: float = 0.0
+    knee_shank: float = 0.27
+    knee_toes: float = 0.9
+    knee_foot: float = 0.0
+    knee_tilt: float = 0.0
     memory: float = 0.05
     speed_memory: float = 0.15
 
@@ -77,21 +108,78 @@ class SequentialIKPlus(SixPointSolver):
         figure: What to pose.
         limits: Keep every joint within the figure's limits.
         habits: Its constants.
+        rotations: Effectors, of ``EFFECTORS``, whose measured rotations are used (trackers with six degrees
+            of freedom). They are met exactly where limits allow; wrists and ankles have none. In a frame
+            without one the effector counts by its position alone.
 
     Raises:
-        SixpointError: A constant has an impossible value.
+        SixpointError: A constant has an impossible value, or there is no such effector.
     """
 
     _entry = staticmethod(solve_plus)
 
-    def __init__(self, figure: Figure, *, limits: bool = True, habits: Habits | None = None) -> None:
+    def __init__(
+        self,
+        figure: Figure,
+        *,
+        limits: bool = True,
+        habits: Habits | None = None,
+        rotations: Sequence[str] = (),
+    ) -> None:
         self.habits = habits or Habits()
         for field in fields(Habits):
             if not np.isfinite(getattr(self.habits, field.name)):
                 raise SixpointError(f"{field.name} must be a number, got {getattr(self.habits, field.name)}")
-        if not (self.habits.memory >= 0 and self.habits.speed_memory >= 0 and self.habits.low_joint >= 0):
-            raise SixpointError("memory, speed_memory and low_joint are numbers from 0")
+        h = self.habits
+        if not min(h.memory, h.speed_memory, h.low_joint, h.head_rise) >= 0:
+            raise SixpointError("memory, speed_memory, low_joint and head_rise are numbers from 0")
+        if not 0 <= h.head_hold <= 1:
+            raise SixpointError(f"head_hold is a share from 0 to 1, got {h.head_hold}")
+        self.rotations = check_effectors(rotations)
         super().__init__(figure, weights=WALKING, limits=limits)
+
+    def solve(
+        self,
+        points: ArrayLike,
+        previous: Solution | None = None,
+        dt: float = 1 / 60,
+        *,
+        rotations: ArrayLike | None = None,
+    ) -> Solution:
+        """Pose the figure for one frame.
+
+        Args:
+            points: (6, 3) positions of the effectors in the order of ``EFFECTORS`` [m]; NaN where lost.
+            previous: The solution of the frame before, if any.
+            dt: Time since that frame [s]; zero or less counts as no time.
+            rotations: (6, 4) their world rotations xyzw, identity in the neutral pose; NaN where unknown.
+                Only those of ``self.rotations`` are read, and they must be given.
+
+        Raises:
+            TargetError: ``points`` or ``rotations`` has another shape, or asked-for rotations are missing.
+            SixpointError: ``previous`` is of another figure.
+        """
+        frame = as_points(points)
+        given = None if rotations is None else np.asarray(rotations, float)[None]
+        return self._solve_frame(frame, self._beside(Targets(frame[None], 1.0, given)), previous, dt)
+
+    def _beside(self, targets: Targets) -> tuple[Array, ...]:
+        """The rotations that are used (F, 6, 4), NaN where unknown; (F, 0, 4) where none are asked for."""
+        if not self.rotations:
+            return (np.empty((len(targets), 0, 4)),)
+        if targets.rotations is None:
+            raise TargetError(
+                f"this solver takes the rotations of {listed(self.rotations)}, but {targets.name} has none; "
+                "make it without rotations=, or give them"
+            )
+        turned = np.full((len(targets), len(EFFECTORS), 4), np.nan)
+        for name in self.rotations:
+            k = EFFECTORS.index(name)
+            given = targets.rotations[:, k]
+            length = np.linalg.norm(given, axis=1, keepdims=True)
+            usable = np.isfinite(length) & (length > 1e-6)
+            turned[:, k] = np.where(usable, given / np.where(usable, length, 1.0), np.nan)
+        return (turned,)
 
     def _options(self, dt: float) -> Array:
         known = self._adapted.get(dt)
@@ -102,11 +190,26 @@ class SequentialIKPlus(SixPointSolver):
             *numbers, memory, speed_memory = astuple(self.habits)
             kept = [exp(-time / constant) if constant > 0 else 0.0 for constant in (memory, speed_memory)]
             rate = 1.0 / time if time > 1e-6 else 0.0
-            known = self._adapted[dt] = np.array([self.limits, *numbers, *kept, rate], float)
+            site = float(np.linalg.norm(self.figure.head_offset) > COINCIDENT)
+            known = self._adapted[dt] = np.array([self.limits, *numbers, *kept, rate, site], float)
         return known
 
     def _build_model(self) -> Model:
-        return build_model(self.figure, SpineChain.from_figure(self.figure, own_pelvis=True))
+        chain = SpineChain.from_figure(self.figure, own_pelvis=True)
+        return build_model(self.figure, chain, ends=bool(self.rotations))
 
     def _make_work(self) -> tuple[Array, ...]:
         return (np.empty((work_rows(self._trunk), 4)),)
+
+
+def check_effectors(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of effectors, each once, in the order of ``EFFECTORS``.
+
+    Raises:
+        SixpointError: There is no such effector; the message lists those there are.
+    """
+    named = [names] if isinstance(names, str) else list(names)
+    unknown = [name for name in named if name not in EFFECTORS]
+    if unknown:
+        raise SixpointError(f"no effector named {listed(unknown)}; there are: {listed(EFFECTORS)}")
+    return tuple(name for name in EFFECTORS if name in named)

@@ -73,11 +73,12 @@ def solve_three(a, b, c, d, e, f, v):
 
 
 @helper
-def close_trunk(segments, balls, limits, goal, damping, low, local, world, segs):
+def close_trunk(segments, balls, limits, goal, damping, low, hold, local, world, segs):
     """Turn the spine by the least angles that bring the head to ``goal`` (from the pelvis) [m].
 
     Gauss-Newton steps of least weighted norm; ``low`` is the weight of the lowest joint, one that of the
-    highest. Returns how far the head is off [m].
+    highest. ``hold`` is how much of the turns' sum, the turn of the spine's top, is avoided: 0 none of it,
+    1 all. Returns how far the head is off [m].
     """
     count = segments.shape[0]
     error = vec.sub(goal, chord_of(segs))
@@ -85,10 +86,11 @@ def close_trunk(segments, balls, limits, goal, damping, low, local, world, segs)
         if vec.norm(error) < CLOSED or count < 2:
             break
         a, b, c, d, e, f = damping, 0.0, 0.0, damping, 0.0, damping
-        lever = (0.0, 0.0, 0.0)
+        lever, middle, total = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
         for k in range(count - 1, 0, -1):
             lever = vec.add(lever, vec.load(segs, k))
             w = low + (1.0 - low) * (k - 1) / max(count - 2, 1)
+            middle, total = vec.madd(middle, w, lever), total + w
             x, y, z = lever
             a += w * (y * y + z * z)
             b -= w * x * y
@@ -96,8 +98,18 @@ def close_trunk(segments, balls, limits, goal, damping, low, local, world, segs)
             d += w * (x * x + z * z)
             e -= w * y * z
             f += w * (x * x + y * y)
+        middle = vec.scale(hold / total, middle)
+        if hold > 0.0:
+            x, y, z = middle
+            w = total / hold
+            a -= w * (y * y + z * z)
+            b += w * x * y
+            c += w * x * z
+            d -= w * (x * x + z * z)
+            e += w * y * z
+            f -= w * (x * x + y * y)
         force = solve_three(a, b, c, d, e, f, error)
-        lever = chord_of(segs)
+        lever = vec.sub(chord_of(segs), middle)
         for k in range(1, count):
             lever = vec.sub(lever, vec.load(segs, k - 1))
             w = low + (1.0 - low) * (k - 1) / max(count - 2, 1)

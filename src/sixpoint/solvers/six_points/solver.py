@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
-from sixpoint.body.targets import Targets, as_points
+from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.errors import SixpointError
 from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Status
@@ -37,11 +37,11 @@ class SixPointSolver(ABC):
 
     A subclass names its compiled entry, which solves F frames in order:
 
-        entry(*arrays, *work, options, points, state, rotations, pelvis, outcome, residual)
+        entry(*arrays, *work, options, points, *beside, state, rotations, pelvis, outcome, residual)
 
     where ``arrays`` are those of ``_lower``, ``work`` those of ``_make_work``, ``options`` the weights at the
-    frame rate, whether limits hold and the numbers of ``_numbers``; ``outcome`` (F, 2) are status and
-    iterations.
+    frame rate, whether limits hold and the numbers of ``_numbers``; ``beside`` is what ``_beside`` takes from
+    the targets, frame by frame; ``outcome`` (F, 2) are status and iterations.
 
     Args:
         figure: What to pose.
@@ -84,6 +84,10 @@ class SixPointSolver(ABC):
     def _make_work(self) -> tuple[Array, ...]:
         """Working memory of the entry; each call has its own, so that threads may share a solver."""
 
+    def _beside(self, targets: Targets) -> tuple[Array, ...]:
+        """What the method reads of each frame beside the points: writable arrays (F, ...)."""
+        return ()
+
     def _numbers(self) -> tuple[float, ...]:
         """Options of the method's own."""
         return ()
@@ -100,7 +104,12 @@ class SixPointSolver(ABC):
             TargetError: ``points`` has another shape.
             SixpointError: ``previous`` is of another figure.
         """
-        frame = as_points(points)
+        return self._solve_frame(as_points(points), (), previous, dt)
+
+    def _solve_frame(
+        self, points: Array, beside: tuple[Array, ...], previous: Solution | None, dt: float
+    ) -> Solution:
+        """One frame; ``beside`` are arrays of one frame."""
         state = self._state_after(previous)
         rotations, pelvis = np.empty((1, len(self.figure.skeleton), 4)), np.empty((1, 3))
         outcome, residual = np.empty((1, 2), np.int64), np.empty((1, 6))
@@ -108,7 +117,8 @@ class SixPointSolver(ABC):
             *self._arrays,
             *self._make_work(),
             self._options(dt),
-            frame[None],
+            points[None],
+            *beside,
             state,
             rotations,
             pelvis,
@@ -131,13 +141,14 @@ class SixPointSolver(ABC):
         rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
         outcome, residual = np.empty((frames, 2), np.int64), np.empty((frames, 6))
         state = self._start.copy()
-        points = targets.positions.copy()  # read-only arrays are another type to Numba: one more compilation
+        # Read-only arrays are another type to Numba: one more compilation.
+        given = (targets.positions.copy(), *self._beside(targets))
         fixed = (*self._arrays, *self._make_work(), self._options(1.0 / targets.rate))
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             out = (rotations[part], pelvis[part], outcome[part], residual[part])
-            type(self)._entry(*fixed, points[part], state, *out)
+            type(self)._entry(*fixed, *(array[part] for array in given), state, *out)
             if progress:
                 progress(part.stop)
         moving, translations = self._place(pelvis)
@@ -159,7 +170,8 @@ class SixPointSolver(ABC):
         r = self.figure.roles
         points = rest[[r.pelvis, r.head, *r.wrist, *r.ankle]]
         points[1] += self.figure.head_offset
-        self.solve(points)
+        neutral = np.tile(rot.IDENTITY, (1, len(EFFECTORS), 1))
+        self.solve_frames(Targets(points[None], 60.0, neutral))
 
     def _state_after(self, previous: Solution | None) -> Array:
         if previous is None:
