@@ -84,6 +84,26 @@ def clamp(balls, b, q):
     return qt.mul(swing, twist), True
 
 
+@helper
+def room(balls, b, q):
+    """How far a rotation is inside its swing limit and inside its twist limit [rad]; negative outside."""
+    row = balls[b]
+    axis = (row[0], row[1], row[2])
+    tau = qt.twist_angle(q, axis)
+    s = qt.mul_vec(q, axis)
+    cosine = min(max(vec.dot(s, axis), -1.0), 1.0)
+    psi = atan2(vec.norm(vec.cross(axis, s)), cosine)
+    theta = atan2(
+        vec.dot(s, (row[SIDE], row[SIDE + 1], row[SIDE + 2])),
+        vec.dot(s, (row[FORWARD], row[FORWARD + 1], row[FORWARD + 2])),
+    )
+    # Near the antipode the limit may be met over the top, see ``clamp``.
+    swing = swing_limit(row, theta) - psi
+    beyond = swing_limit(row, theta - pi if theta > 0.0 else theta + pi) - (2.0 * pi - psi)
+    swing = max(swing, beyond)
+    return swing, min(tau - row[TWIST], row[TWIST + 1] - tau)
+
+
 def build_ball_rows(limits):
     """Lower ``body.dofs.SwingTwist`` limits to rows (B, W); None means unlimited."""
     width = max([len(limit.theta) for limit in limits if limit is not None], default=3)

@@ -1,9 +1,10 @@
 """One frame of SIK+: pelvis, trunk, clavicles, limbs, in closed form but for the trunk's few Newton steps.
 
 In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
-5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s]; the fourth numbers of the
-first four rows are the swivel angles of the limbs [rad].
+5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s].
 """
+
+from math import atan2
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
@@ -25,6 +26,15 @@ RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 TWIST = 0.8  # rad, largest twist of the thorax
 DAMPING = 1e-6  # m^2, of the trunk's Newton steps
 ALIGN = 1e-3  # m, a trunk that stays farther off turns as a whole
+
+
+@helper
+def turn_at_most(before, x, y, most):
+    """X axis on its way about ``y`` from where it was [rad]; both across y, ``before`` may be zero."""
+    angle = atan2(vec.dot(vec.cross(before, x), y), vec.dot(before, x))
+    if vec.norm(before) < 0.5 or abs(angle) <= most:
+        return x
+    return qt.mul_vec(qt.from_axis_angle(y, most if angle > 0.0 else -most), before)
 
 
 @helper
@@ -55,7 +65,10 @@ def estimate_pelvis(filled, memory, s):
         if vec.norm(x) < 0.1:
             x = vec.reject((0.0, 0.0, -1.0), y)
     vec.store(memory, 1, told)
-    return vec.unit(x), y, chord
+    x = vec.unit(x)
+    if began:
+        x = turn_at_most(vec.unit(vec.reject(vec.load(memory, 0), y)), x, y, s.turn_speed * s.dt)
+    return x, y, chord
 
 
 @helper
@@ -152,6 +165,7 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     count = segs.shape[0]
+    began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
     root = pose_trunk(model, s, filled, turned, local, memory, world, segs, scratch.flat, residual)
     if turned.shape[0] > 0 and not s.head_site:
@@ -181,13 +195,18 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
             frame, place = place_leg(model.hips, limb - 2, root, world)
         gap = qt.inv_mul_vec(frame, vec.sub(target, place))
         row = limb_row(count, limb)
-        upper, hinge, end, memory[limb, 3] = solve_by_pole(
+        upper, hinge, end = solve_by_pole(
             gap,
             model.limbs[limb, 0],
             model.limbs[limb, 1],
             -1.0 if limb < 2 else 1.0,
             point_limb(s, limb, vec.unit(gap), frame, turned),
-            memory[limb, 3],
+            began,
+            qt.load(local, row),
+            qt.load(local, row + 2),
+            s.swivel_memory,
+            s.swivel_speed,
+            s.dt,
             s.limits,
             model.balls,
             row,

@@ -62,7 +62,6 @@ def pole_of_end(n, pole, end, side, along, front, grip, tilt):
     more or less; its lateral axis (``grip``) and, on its ``side``, the long one (``tilt``) lie across it.
     """
     y = qt.y_axis(end)
-    usual = vec.unit(vec.reject(pole, n))
     told = vec.add(vec.scale(along, y), vec.scale(front, qt.z_axis(end)))
     across = vec.add(vec.scale(grip, qt.x_axis(end)), vec.scale(side * tilt, y))
-    return vec.add(usual, vec.add(vec.reject(told, n), vec.cross(across, n)))
+    return vec.add(vec.reject(vec.add(pole, told), n), vec.cross(across, n))

@@ -12,6 +12,7 @@ class Settings(NamedTuple):
         kept: Share of what told X that is kept over the frame.
         kept_speed: Share of the velocity that is kept over the frame.
         rate: Frames per second; 0 where no time passed [Hz].
+        dt: Time of the frame [s].
         head_site: Whether the head is an end site, turned by the last trunk joint.
     """
 
@@ -45,9 +46,13 @@ class Settings(NamedTuple):
     knee_toes: float
     knee_foot: float
     knee_tilt: float
+    swivel_memory: float
+    swivel_speed: float
+    turn_speed: float
     kept: float
     kept_speed: float
     rate: float
+    dt: float
     head_site: bool
 
 
@@ -88,5 +93,9 @@ def unpack_settings(options):
         options[30],
         options[31],
         options[32],
-        options[33] > 0.0,
+        options[33],
+        options[34],
+        options[35],
+        options[36],
+        options[37] > 0.0,
     )

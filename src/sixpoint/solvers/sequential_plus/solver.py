@@ -60,6 +60,10 @@ class Habits:
         knee_toes: How much it points where the toes do.
         knee_foot: How much the knee's axis follows the foot's lateral one.
         knee_tilt: How much it follows the foot's vertical axis.
+        swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it is
+            zero across the line and grows without bound along it [s].
+        swivel_speed: Largest change of a swivel angle, but for what limits ask [rad/s].
+        turn_speed: Largest speed of the pelvis about its Y [rad/s].
         memory: Time constant of what tells the pelvis' X axis [s].
         speed_memory: Time constant of the pelvis' velocity [s].
     """
@@ -79,20 +83,23 @@ class Habits:
     elbow_back: float = 0.6
     elbow_lift: float = 1.05
     knee_out: float = 0.0
-    known_twist: float = 0.225
-    known_bend: float = 0.1
+    known_twist: float = 0.5
+    known_bend: float = 0.0
     head_twist: float = 0.8
-    head_bend: float = 0.5
-    head_rise: float = 2.0
-    head_hold: float = 0.3
-    elbow_hand: float = 0.5
-    elbow_palm: float = -0.25
-    elbow_grip: float = 0.5
+    head_bend: float = 0.25
+    head_rise: float = 3.0
+    head_hold: float = 0.6
+    elbow_hand: float = 0.3
+    elbow_palm: float = 0.0
+    elbow_grip: float = 0.0
     elbow_tilt: float = 0.0
     knee_shank: float = 0.27
     knee_toes: float = 0.9
     knee_foot: float = 0.0
     knee_tilt: float = 0.0
+    swivel_memory: float = 0.01
+    swivel_speed: float = 20.0
+    turn_speed: float = 15.0
     memory: float = 0.05
     speed_memory: float = 0.15
 
@@ -191,7 +198,7 @@ class SequentialIKPlus(SixPointSolver):
             kept = [exp(-time / constant) if constant > 0 else 0.0 for constant in (memory, speed_memory)]
             rate = 1.0 / time if time > 1e-6 else 0.0
             site = float(np.linalg.norm(self.figure.head_offset) > COINCIDENT)
-            known = self._adapted[dt] = np.array([self.limits, *numbers, *kept, rate, site], float)
+            known = self._adapted[dt] = np.array([self.limits, *numbers, *kept, rate, time, site], float)
         return known
 
     def _build_model(self) -> Model:

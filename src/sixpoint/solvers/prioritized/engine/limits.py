@@ -3,38 +3,16 @@
 Reference: Baerlocher and Boulic 2004; Unzueta et al. 2008, section 9; swing and twist limits as in section 7.
 """
 
-from math import atan2, pi
-
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
-from sixpoint.kernels.swing_twist import FORWARD, SIDE, TWIST, clamp, swing_limit
+from sixpoint.kernels.swing_twist import clamp, room
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
 from sixpoint.solvers.prioritized.engine.wishes import ENFORCED, WAITING
 
 TOLERANCE = 1e-9
 DIFFERENCE = 1e-4  # step of the numerical gradient [rad]
-
-
-@helper
-def room(balls, b, q):
-    """How far a rotation is inside its swing limit and inside its twist limit [rad]; negative outside."""
-    row = balls[b]
-    axis = (row[0], row[1], row[2])
-    tau = qt.twist_angle(q, axis)
-    s = qt.mul_vec(q, axis)
-    cosine = min(max(vec.dot(s, axis), -1.0), 1.0)
-    psi = atan2(vec.norm(vec.cross(axis, s)), cosine)
-    theta = atan2(
-        vec.dot(s, (row[SIDE], row[SIDE + 1], row[SIDE + 2])),
-        vec.dot(s, (row[FORWARD], row[FORWARD + 1], row[FORWARD + 2])),
-    )
-    # Near the antipode the limit may be met over the top; see swing_twist.clamp.
-    swing = swing_limit(row, theta) - psi
-    beyond = swing_limit(row, theta - pi if theta > 0.0 else theta + pi) - (2.0 * pi - psi)
-    swing = max(swing, beyond)
-    return swing, min(tau - row[TWIST], row[TWIST + 1] - tau)
 
 
 @helper
