@@ -25,7 +25,7 @@ TOLD = 0.02  # m, lines that tell less than this tell nothing
 RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 TWIST = 0.8  # rad, largest twist of the thorax
 DAMPING = 1e-6  # m^2, of the trunk's Newton steps
-ALIGN = 1e-3  # m, a trunk that stays farther off turns as a whole
+ALIGN = 1e-3  # m, where the spine stays farther off the pelvis turns too
 
 
 @helper
@@ -72,8 +72,8 @@ def estimate_pelvis(filled, memory, s):
 
 
 @helper
-def close_on_head(model, s, goal, turned, pinned, local, world, segs):
-    """Bring the head to its goal; returns how far it is off [m].
+def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
+    """Bring the head to its goal by the joints from ``first`` on; returns how far it is off [m].
 
     A head that is an end site and whose rotation is measured (``pinned``) has its joint rotated so; the
     spine below reaches where that puts the joint.
@@ -88,6 +88,7 @@ def close_on_head(model, s, goal, turned, pinned, local, world, segs):
             balls,
             s.limits,
             there,
+            first,
             DAMPING,
             s.low_joint,
             hold,
@@ -100,7 +101,7 @@ def close_on_head(model, s, goal, turned, pinned, local, world, segs):
         off = vec.norm(vec.sub(goal, chord_of(segs)))
         if could and off <= ALIGN:
             return off
-    return close_trunk(segments, balls, s.limits, goal, DAMPING, s.low_joint, hold, local, world, segs)
+    return close_trunk(segments, balls, s.limits, goal, first, DAMPING, s.low_joint, hold, local, world, segs)
 
 
 @helper
@@ -125,12 +126,9 @@ def pose_trunk(model, s, filled, turned, local, memory, world, segs, flat, resid
         lean_to_head(model.segments, relative, twist, s.head_twist, s.head_bend, s.head_rise, local)
         place_trunk(model.segments, local, world, segs)
         pinned = s.head_site and segs.shape[0] > 1
-    off = close_on_head(model, s, goal, turned, pinned, local, world, segs)
-    if off > ALIGN and not held:  # out of reach of the spine: the pelvis turns, pelvis and head share the rest
-        turn = qt.arc(vec.unit(chord_of(segs)), chord, x)
-        qt.store(local, 0, qt.normalised(qt.mul(turn, qt.load(local, 0))))
-        place_trunk(model.segments, local, world, segs)
-        close_on_head(model, s, goal, turned, pinned, local, world, segs)
+    off = close_on_head(model, s, goal, 1, turned, pinned, local, world, segs)
+    if off > ALIGN and not held:  # out of reach of the spine: the pelvis turns too
+        close_on_head(model, s, goal, 0, turned, pinned, local, world, segs)
     missed = vec.sub(goal, chord_of(segs))
     root = vec.madd(pelvis, 0.5, missed)
     top = vec.add(root, chord_of(segs))

@@ -3,7 +3,7 @@
 Scratch arrays as in ``sequential.spine``.
 """
 
-from math import atan2
+from math import atan2, sqrt
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
@@ -13,8 +13,10 @@ from sixpoint.solvers.sequential.bending import plane_components, search_angle
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 
 ROUNDS = 8  # Newton steps at most
-CLOSED = 1e-9  # m
-STEP = 0.3  # rad, largest turn of a joint in one step
+CLOSED = 1e-7  # m
+FAR = 0.05  # how much the damping grows with the square of the distance
+HALF_STEP = 0.2  # rad, half the largest turn of a joint in one step
+YIELD = 40.0  # how much less a joint counts in the next step that its limits turned back
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
 
@@ -65,31 +67,46 @@ def solve_three(a, b, c, d, e, f, v):
     det = a * m0 + b * m1 + c * m2
     if abs(det) < 1e-18:
         return (0.0, 0.0, 0.0)
-    return (
-        (m0 * v[0] + m1 * v[1] + m2 * v[2]) / det,
-        (m1 * v[0] + m3 * v[1] + m4 * v[2]) / det,
-        (m2 * v[0] + m4 * v[1] + m5 * v[2]) / det,
-    )
+    x, y, z = vec.scale(1.0 / det, v)
+    return (m0 * x + m1 * y + m2 * z, m1 * x + m3 * y + m4 * z, m2 * x + m4 * y + m5 * z)
 
 
 @helper
-def close_trunk(segments, balls, limits, goal, damping, low, hold, local, world, segs):
+def shortened(segs, first, lever, force):
+    """The share of a step by which no joint turns more than a step may; ``force`` makes half turns."""
+    largest = 0.0
+    for k in range(first, segs.shape[0]):
+        turn = vec.cross(lever, force)
+        largest = max(largest, segs[k, 3] * segs[k, 3] * vec.dot(turn, turn))
+        lever = vec.sub(lever, vec.load(segs, k))
+    return HALF_STEP / sqrt(largest) if largest > HALF_STEP * HALF_STEP else 1.0
+
+
+@helper
+def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local, world, segs):
     """Turn the spine by the least angles that bring the head to ``goal`` (from the pelvis) [m].
 
-    Gauss-Newton steps of least weighted norm; ``low`` is the weight of the lowest joint, one that of the
-    highest. ``hold`` is how much of the turns' sum, the turn of the spine's top, is avoided: 0 none of it,
+    Gauss-Newton steps of least weighted norm. Joints turn from the ``first`` on: 1, or 0 if the pelvis turns
+    too. ``low`` is the weight of the lowest joint, one that of the highest. ``hold`` is how much of the turns' sum, the turn of the spine's top, is avoided: 0 none of it,
     1 all. Returns how far the head is off [m].
     """
     count = segments.shape[0]
     error = vec.sub(goal, chord_of(segs))
+    if count <= first:
+        return vec.norm(error)
+    slope = (1.0 - low) / max(count - 2, 1)
+    for k in range(first, count):
+        segs[k, 3] = low + slope * max(k - 1, 0)
     for _ in range(ROUNDS):
-        if vec.norm(error) < CLOSED or count < 2:
+        size = vec.dot(error, error)
+        if size < CLOSED * CLOSED:
             break
-        a, b, c, d, e, f = damping, 0.0, 0.0, damping, 0.0, damping
+        a = damping + FAR * size
+        b, c, d, e, f = 0.0, 0.0, a, 0.0, a
         lever, middle, total = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-        for k in range(count - 1, 0, -1):
+        for k in range(count - 1, first - 1, -1):
             lever = vec.add(lever, vec.load(segs, k))
-            w = low + (1.0 - low) * (k - 1) / max(count - 2, 1)
+            w = segs[k, 3]
             middle, total = vec.madd(middle, w, lever), total + w
             x, y, z = lever
             a += w * (y * y + z * z)
@@ -98,8 +115,8 @@ def close_trunk(segments, balls, limits, goal, damping, low, hold, local, world,
             d += w * (x * x + z * z)
             e -= w * y * z
             f += w * (x * x + y * y)
-        middle = vec.scale(hold / total, middle)
         if hold > 0.0:
+            middle = vec.scale(hold / total, middle)
             x, y, z = middle
             w = total / hold
             a -= w * (y * y + z * z)
@@ -108,20 +125,20 @@ def close_trunk(segments, balls, limits, goal, damping, low, hold, local, world,
             d -= w * (x * x + z * z)
             e += w * y * z
             f -= w * (x * x + y * y)
-        force = solve_three(a, b, c, d, e, f, error)
-        lever = vec.sub(chord_of(segs), middle)
-        for k in range(1, count):
-            lever = vec.sub(lever, vec.load(segs, k - 1))
-            w = low + (1.0 - low) * (k - 1) / max(count - 2, 1)
-            turn = vec.scale(w, vec.cross(lever, force))
-            size = vec.norm(turn)
-            if size > STEP:
-                turn = vec.scale(STEP / size, turn)
-            parent = qt.load(world, k - 1)
-            q = qt.mul(qt.exp(qt.inv_mul_vec(parent, turn)), qt.load(local, k))
-            q = qt.normalised(q)
+            lever = vec.sub(lever, middle)
+        force = vec.scale(0.5, solve_three(a, b, c, d, e, f, error))
+        force = vec.scale(shortened(segs, first, lever, force), force)
+        for k in range(first, count):
+            turn = vec.scale(segs[k, 3], vec.cross(lever, force))
+            lever = vec.sub(lever, vec.load(segs, k))
+            # Half the turn with a 1, normalised: exact to third order, which is enough for a step.
+            x, y, z = qt.inv_mul_vec(qt.load(world, k - 1), turn) if k > 0 else turn
+            q = qt.normalised(qt.mul((x, y, z, 1.0), qt.load(local, k)))
             if limits:
-                q, _ = clamp(balls, k, q)
+                free = q
+                q, changed = clamp(balls, k, q)
+                if changed:  # by the sine of half the excess
+                    segs[k, 3] /= 1.0 + YIELD * sqrt(max(1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2, 0.0))
             qt.store(local, k, q)
         place_trunk(segments, local, world, segs)
         error = vec.sub(goal, chord_of(segs))
