@@ -61,7 +61,7 @@ MEASURED_STEPS = {
     "knee_tilt": 0.3,
 }
 TRACKED = (sp.EFFECTORS[:1], sp.EFFECTORS[:2], sp.EFFECTORS)
-RANGES = {"low_joint": (0.0, 10.0), "head_rise": (0.1, 10.0), "head_hold": (0.0, 1.0)}
+RANGES = {"low_joint": (0.01, 10.0), "head_rise": (0.1, 10.0), "head_hold": (0.0, 1.0)}
 
 
 def load_clips(folder: Path, part: int, parts: int) -> list[tuple[str, sp.Figure, sp.Motion, sp.Targets]]:
@@ -136,7 +136,7 @@ def main() -> None:
                 while True:
                     value = getattr(best, name) + sign * step * scale
                     least, most = RANGES.get(name, (-np.inf, np.inf))
-                    if not least < value <= most:
+                    if not least <= value <= most:
                         break
                     trial = replace(best, **{name: round(value, 4)})
                     if judge(trial)[0] >= judge(best)[0] - 1e-5:

@@ -147,7 +147,7 @@ def solve_by_pole(
                     )
                     if vec.norm(vec.sub(end, target)) > REACHED:
                         phi, free = free_beside(
-                            n, u, cosine, sine, h, before, first, STEP, TRIES, 1.0, balls, ball
+                            n, u, cosine, sine, h, 0.0, -first, STEP, TRIES, 1.0, balls, ball
                         )
                     if not free:
                         return root, bent, end
