@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -36,6 +37,9 @@ SOLVERS: dict[str, Callable[..., Solver]] = {
 }
 """Name -> what makes the solver of a figure."""
 
+DEFAULT = "sik+"
+"""The method where none is named."""
+
 
 def find_solver(name: str) -> Callable[..., Solver]:
     """What makes a solver: a name of ``SOLVERS``, or ``module:attribute`` of a user's own.
@@ -56,6 +60,12 @@ def find_solver(name: str) -> Callable[..., Solver]:
     if not callable(found):
         raise SixpointError(f"{name!r}: the module {module} has no class or function {attribute!r}")
     return found  # type: ignore[no-any-return]
+
+
+def find_options(solver: Callable[..., Solver]) -> list[str]:
+    """Names of the options of a solver; the figure comes first and is none."""
+    parameters = list(inspect.signature(solver).parameters.values())[1:]
+    return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
 
 
 def _import(module: str, name: str) -> Any:
