@@ -11,12 +11,12 @@ from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.base import Solver
 from sixpoint.solvers.jacobian.solver import DAMPING, REACH
-from sixpoint.solvers.registry import SOLVERS, find_options, find_solver
+from sixpoint.solvers.registry import SOLVERS, find_fitted_on, find_options, find_solver
 
 STOP = "stops at 1 cm, at a gain below 1 mm, or after 20 iterations"
 PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "sik": ({}, "closed form; the chord search is exact"),
-    "sik+": ({}, "constants chosen on other people's recordings, see benchmarks/tune_sik_plus.py"),
+    "sik+": ({}, "constants as benchmarks/tune_sik_plus.py chose them"),
     "tgbsik": ({}, "weight of twist 1; swivel searched on the whole circle by 0.1, then 0.01 rad"),
     "kma": ({}, f"from the standing pose; swivel angles zero; the spine's CCD {STOP}"),
     "ccd": ({}, f"from tip to root; {STOP}"),
@@ -43,25 +43,33 @@ class Method:
         solver: Name of ``SOLVERS``, or ``module:Class``.
         options: Its fixed options.
         preset: The same in words.
+        fitted_on: People whose recordings it was fitted on, as "cmu/02".
     """
 
     name: str
     solver: str
     options: Mapping[str, Any] = field(default_factory=dict)
     preset: str = ""
+    fitted_on: tuple[str, ...] = ()
 
     @classmethod
     def named(cls, solver: str, name: str = "", options: Mapping[str, Any] | None = None) -> Method:
         """A method by the name of its solver, with its preset and further options.
 
         Raises:
-            SixpointError: There is no such solver, or it has no such option.
+            SixpointError: There is no such solver or option, or it says wrongly what it was fitted on.
         """
         found = find_solver(solver)
         usual, text = PRESETS.get(solver, ({}, "the user's own"))
         if options:
             text = ", ".join(f"{key} {value}" for key, value in options.items()) + f"; {text}"
-        method = cls(name or solver.rpartition(":")[2], solver, {**usual, **(options or {})}, text)
+        method = cls(
+            name or solver.rpartition(":")[2],
+            solver,
+            {**usual, **(options or {})},
+            text,
+            find_fitted_on(solver),
+        )
         known = find_options(found)
         unknown = [key for key in method.options if key not in known]
         if unknown and not _takes_more(found):
