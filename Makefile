@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check benchmark results comparison peers study examples clean
+.PHONY: demo test check benchmark results comparison ablation peers study examples picture clean
 
 demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
 	$(BIN)/sixpoint demo --force
@@ -26,6 +26,9 @@ results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/
 comparison: $(VENV)/run.stamp  ## Compare all methods on the paper's clips and rewrite docs/results.md
 	$(BIN)/python benchmarks/comparison.py
 
+ablation: $(VENV)/run.stamp  ## Switch off each rule and input of SIK+ and rewrite docs/results.md
+	$(BIN)/python benchmarks/ablation.py
+
 peers: $(VENV)/run.stamp  ## Time six targets on hinges beside mink and rewrite docs/results.md
 	@$(PIP) install --editable '.[bench]'
 	$(BIN)/python benchmarks/peers.py --docs
@@ -37,6 +40,10 @@ study: $(VENV)/run.stamp  ## Make the figures of both papers again and rewrite d
 examples: $(VENV)/run.stamp  ## Run the examples and rewrite docs/shelf_reach
 	$(BIN)/python examples/shelf_reach.py --out docs/shelf_reach --force
 	rm docs/shelf_reach/*.bvh
+
+picture: $(VENV)/run.stamp  ## Draw the picture of the README again
+	$(BIN)/sixpoint demo --sample climb_and_hang --out demo --force
+	cp demo/climb_and_hang.png docs/demo.png
 
 clean:
 	rm -rf $(VENV) demo

@@ -14,6 +14,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from marked import rewrite
 from rich.progress import Progress
 
 from sixpoint.jobs.compare.job import compare
@@ -61,18 +62,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     data = parser.parse_args().data
-    text = RESULTS.read_text("utf-8")
     with tempfile.TemporaryDirectory() as folder:
+        parts = {}
         for study in ("paper", "damping"):
             mark = study.replace("paper", "comparison")
-            made = run(study, data, Path(folder) / study)
-            begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-            before, after = text.split(begin)[0], text.split(end)[1]
-            text = f"{before}{begin}\n{made}\n{end}{after}"
+            parts[mark] = run(study, data, Path(folder) / study)
         PICTURES.mkdir(exist_ok=True)
         for name in SHOWN:
             shutil.copyfile(Path(folder) / "paper" / "pictures" / name, PICTURES / name)
-    RESULTS.write_text(text, "utf-8")
+    rewrite(RESULTS, parts)
     print(f"written: {RESULTS}, {PICTURES}")
 
 

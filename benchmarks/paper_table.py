@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from marked import rewrite
 
 import sixpoint as sp
 
@@ -168,14 +169,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     folder = parser.parse_args().data
-    text = RESULTS.read_text("utf-8")
+    parts = {}
     for mark, make in zip(MARKS, (table, table_pik, table_plus), strict=True):
-        lines = make(folder)
-        print("\n".join(lines), "\n")
-        begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-        before, after = text.split(begin)[0], text.split(end)[1]
-        text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
-    RESULTS.write_text(text, "utf-8")
+        parts[mark] = "\n".join(make(folder))
+        print(parts[mark], "\n")
+    rewrite(RESULTS, parts)
 
 
 if __name__ == "__main__":

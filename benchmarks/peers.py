@@ -28,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 from hinge_human import Array, Problem, Truth, build_own, load_outside
+from marked import rewrite
 from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
@@ -216,13 +217,9 @@ def table(rows: Sequence[dict]) -> list[str]:
 def write_docs(title: str, lines: list[str], own: bool) -> None:
     """Replace the table between the marks of docs/results.md."""
     mark = "peers own" if own else "peers outside"
-    text = RESULTS.read_text("utf-8")
-    begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-    before, after = text.split(begin)[0], text.split(end)[1]
     machine = f"Python {platform.python_version()}, numba {version('numba')}"
     machine += "".join(f", {n} {version(n)}" for n in ("mink", "mujoco") if importlib.util.find_spec(n))
-    body = "\n".join([begin, "", f"Problem: {title}. {machine}.", "", *lines, "", end])
-    RESULTS.write_text(before + body + after, "utf-8")
+    rewrite(RESULTS, {mark: "\n".join(["", f"Problem: {title}. {machine}.", "", *lines, ""])})
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 import sixpoint as sp
 from sixpoint.cli import main
+from sixpoint.solvers.registry import DEFAULT
 
 SNAKE = """HIERARCHY
 ROOT a
@@ -85,13 +86,22 @@ def test_reconstruct_keeps_rig_and_frames(place, capsys):
     """A recording is reconstructed on its own rig, frame for frame, and measured."""
     code, out, _ = run(capsys, "reconstruct", "walk.bvh")
     assert code == 0
-    truth, result = sp.load("walk.bvh"), sp.load("walk_sik.bvh")
+    truth, result = sp.load("walk.bvh"), sp.load("walk_sik+.bvh")
     assert result.skeleton.names == truth.skeleton.names
     assert len(result) == len(truth)
     assert result.rate == truth.rate
     np.testing.assert_allclose(result.skeleton.offsets[1:], truth.skeleton.offsets[1:], atol=1e-5)
     for word in ("position error", "orientation error", "us per frame", "found by names", "skullbase"):
         assert word in out
+
+
+def test_the_default_method_is_sik_plus(place, capsys):
+    """Without --method the result is that of `sik+`, byte for byte; `sik` with weights is another."""
+    assert run(capsys, "reconstruct", "walk.bvh", "-o", "x.bvh")[0] == 0
+    assert run(capsys, "reconstruct", "walk.bvh", "-o", "y.bvh", "--method", DEFAULT)[0] == 0
+    assert Path("x.bvh").read_bytes() == Path("y.bvh").read_bytes()
+    assert run(capsys, "reconstruct", "walk.bvh", "--method", "sik", "--weights", "1,1,0")[0] == 0
+    assert Path("walk_sik.bvh").read_bytes() != Path("x.bvh").read_bytes()
 
 
 def test_reconstruct_slices_frames(place, capsys):
@@ -108,7 +118,7 @@ def test_reconstruct_points_with_a_stature(place, capsys):
     assert "1.6 m tall" in out
     assert "position error" not in out
     assert "1.75 m tall" in run(capsys, "reconstruct", "walk.csv")[1]
-    assert len(sp.load("x.bvh")) == len(sp.load("walk_sik.bvh")) == 40
+    assert len(sp.load("x.bvh")) == len(sp.load("walk_sik+.bvh")) == 40
 
 
 def test_reconstruct_points_on_a_rig(place, capsys):
@@ -153,9 +163,13 @@ def test_reconstruct_draws_a_picture_and_copies_extras(place, capsys):
         ("reconstruct walk.bvh --frames ::0", "start:stop:step"),
         ("reconstruct walk.bvh --frames 1000:", "there are 40"),
         ("reconstruct walk.bvh --method magic", "methods: sik"),
+        ("reconstruct walk.bvh --weights 1,1,0", "'sik+' has no option weights; sik, tgbsik"),
+        ("reconstruct walk.bvh --weights 1,1,0", "add --method sik"),
+        ("reconstruct walk.bvh --search literal", "add --method sik"),
+        ("reconstruct walk.bvh --method pik --weights 1,1,0", "add --method sik"),
         ("reconstruct walk.bvh --weights 1,2", "three numbers"),
         ("reconstruct walk.bvh --weights 1,2,x", "three numbers"),
-        ("reconstruct walk.bvh --weights 0,0,0", "three numbers"),
+        ("reconstruct walk.bvh --method sik --weights 0,0,0", "three numbers"),
         ("reconstruct walk.bvh --search slow", "literal"),
         ("reconstruct walk.bvh --limits absent.toml", "absent.toml"),
         ("reconstruct walk.bvh --mapping absent.toml", "absent.toml"),

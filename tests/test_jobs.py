@@ -9,6 +9,7 @@ import pytest
 
 import sixpoint as sp
 from sixpoint.jobs.convert import convert
+from sixpoint.jobs.demo import demo
 from sixpoint.jobs.info import MotionInfo, TargetsInfo, inspect
 from sixpoint.jobs.progress import silent
 from sixpoint.jobs.reading import Reading, open_motion, parse_frames
@@ -82,7 +83,7 @@ def test_reconstruct_agrees_with_the_library(walk):
     done = reconstruct(walk, walk.with_name("out.bvh"))
     motion = sp.load(walk)
     figure = sp.Figure.from_motion(motion)
-    result = sp.SequentialIK(figure).solve_motion(figure.targets(motion))
+    result = sp.SequentialIKPlus(figure).solve_motion(figure.targets(motion))
     errors = sp.compute_errors(figure, motion, result)
     assert done.errors is not None
     assert done.errors.position == pytest.approx(errors.position, abs=1e-12)
@@ -125,6 +126,17 @@ def test_a_solver_refuses_options_it_lacks(monkeypatch):
     monkeypatch.setitem(sp.SOLVERS, "plain", Plain)
     with pytest.raises(sp.SixpointError, match="weights"):
         Solving(method="plain", weights=(1, 1, 0)).check()
+
+
+@pytest.mark.parametrize("method", ["sik+", "sik", "pik"])
+def test_the_demo_gives_weights_to_methods_that_have_them(tmp_path, method):
+    """The kick of `sik` has the paper's weights for kicks; other methods are shown as they are."""
+    clip = demo(tmp_path, names=["jump_kick"], solving=Solving(method=method))[0]
+    figure = sp.Figure.from_stature(1.75)
+    truth = sp.make_sample("jump_kick", figure)
+    options = {"weights": sp.FIGHTING} if method == "sik" else {}
+    result = sp.make_solver(method, figure, **options).solve_motion(figure.targets(truth))
+    assert clip.errors.position == pytest.approx(sp.compute_errors(figure, truth, result).position, abs=1e-12)
 
 
 def test_inspect_tells_motions_from_targets(walk):

@@ -4,7 +4,7 @@
 
     motion = sp.load("17_10.amc")
     figure = sp.Figure.from_motion(motion)
-    result = sp.SequentialIK(figure).solve_motion(figure.targets(motion))
+    result = sp.SequentialIKPlus(figure).solve_motion(figure.targets(motion))
     sp.save(result, "boxing.bvh")
 
 Metres, radians, seconds; Y up, Z forward, X to the figure's left; quaternions are xyzw.

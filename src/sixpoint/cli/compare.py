@@ -79,8 +79,7 @@ def compare(
         done = run(chosen, out, limits_file=limits, force=force, progress=progress)
     for clip in chosen.clips:
         rows = [row for row in done.rows if row.clip == clip.name]
-        frames_of = max(row.frames for row in rows)
-        screen.say(f"{clip.name}: {frames_of} frames", style="bold")
+        screen.say(f"{clip.name}: {max(row.frames for row in rows)} frames{_use(rows)}", style="bold")
         if any(not row.error for row in rows):
             screen.table(COLUMNS, [_cells(row) for row in rows if not row.error])
         for error, names in _failures(rows).items():
@@ -139,6 +138,15 @@ def _study(
     if methods is not None:
         made = replace(made, methods=choose_methods(methods))
     return replace(made, limits=False) if no_limits else made
+
+
+def _use(rows: Sequence[Row]) -> str:
+    """What a clip was used for, if it is no test."""
+    from sixpoint.study.comparison.fitting import USES
+
+    use = USES.get(rows[0].split)
+    person = f" (person {rows[0].person})" if rows[0].person else ""
+    return f", {use}{person}: in no average" if use else ""
 
 
 def _failures(rows: Sequence[Row]) -> dict[str, list[str]]:

@@ -36,19 +36,19 @@ def reconstruct(
     method: Annotated[
         str,
         Parameter(
-            help="How to solve: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik or pik-flext; "
-            "`module:Class` for your own."
+            help="How to solve: sik+ (world Y must be up), sik, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, "
+            "sdls, pik or pik-flext; `module:Class` for your own."
         ),
-    ] = "sik",
+    ] = "sik+",
     weights: Annotated[
         str | None,
         Parameter(
-            help="Influence of wrists, ankles and the last frame on the turn of the pelvis: 1,1,0 for "
-            "boxing and kicks; 0.1,0.1,1, the default, is steadier: walking and climbing."
+            help="Of sik, and of all but sik+, pik and pik-flext: influence of wrists, ankles and the last "
+            "frame on the turn of the pelvis: 1,1,0 for boxing and kicks; 0.1,0.1,1 is steadier."
         ),
     ] = None,
     search: Annotated[
-        Literal["exact", "literal"] | None, Parameter(help="How the bend of the spine is found.")
+        Literal["exact", "literal"] | None, Parameter(help="Of sik: how the bend of the spine is found.")
     ] = None,
     limits: LimitsFile = None,
     no_limits: NoLimits = False,
@@ -74,7 +74,7 @@ def reconstruct(
     ```
     sixpoint reconstruct 17_10.amc -o boxing.bvh --picture boxing.png
     sixpoint reconstruct 90_05.bvh --frames 1: --extras
-    sixpoint reconstruct kick.bvh --weights 1,1,0
+    sixpoint reconstruct kick.bvh --method sik --weights 1,1,0
     sixpoint reconstruct points.csv --stature 1.68
     sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
     ```

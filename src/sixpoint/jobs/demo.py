@@ -13,11 +13,12 @@ from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reconstruct import STATURE
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.samples import SAMPLES, make_sample
+from sixpoint.solvers.registry import find_options, find_solver
 from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.study.metrics import Errors, compute_errors
 
 FAST = ("boxing", "jump_kick")
-"""Motions for which the pelvis follows wrists and ankles at once, as the paper has it for such clips."""
+"""Motions for which the paper has the pelvis follow wrists and ankles at once, by methods with weights."""
 ENDINGS = ("_truth.bvh", "_result.bvh", "_points.csv", ".png")
 """What is written of each motion, after its name."""
 
@@ -70,10 +71,12 @@ def demo(
     figure = Figure.from_stature(stature)
     _prepare_folder(out, chosen, force)
     progress("reconstructing", 0, len(chosen))
+    weighted = solving.weights is None and "weights" in find_options(find_solver(solving.method))
     clips = []
     for number, name in enumerate(chosen, start=1):
         weights = FIGHTING if name in FAST else WALKING
-        clips.append(_run(name, figure, out, replace(solving, weights=solving.weights or weights)))
+        own = replace(solving, weights=weights) if weighted else solving
+        clips.append(_run(name, figure, out, own))
         progress("reconstructing", number, len(chosen))
     return clips
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError, listed
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.solvers.base import MotionSolution
-from sixpoint.solvers.registry import find_solver, make_solver
+from sixpoint.solvers.registry import DEFAULT, SOLVERS, find_options, find_solver, make_solver
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Solving:
         limits_file: A table of joint limits in place of the shipped one.
     """
 
-    method: str = "sik"
+    method: str = DEFAULT
     weights: tuple[float, float, float] | None = None
     search: str | None = None
     limits: bool = True
@@ -44,10 +43,10 @@ class Solving:
         solver = find_solver(self.method)
         if not self.limits and self.limits_file is not None:
             raise SixpointError("--limits FILE and --no-limits exclude each other")
-        known = inspect.signature(solver).parameters
-        unknown = [name for name in self.options if name not in known]
-        if unknown:
-            raise SixpointError(f"the method {self.method!r} has no option {listed(unknown)}")
+        known = find_options(solver)
+        for name in self.options:
+            if name not in known:
+                raise SixpointError(_explain_option(name, self.method))
         make_solver(self.method, Figure.from_stature(), **self.options)
 
     @property
@@ -62,6 +61,13 @@ class Solving:
     def load_limits(self) -> Limits | None:
         """The joint limits asked for; None is the shipped table."""
         return None if self.limits_file is None else Limits.load(self.limits_file)
+
+
+def _explain_option(name: str, method: str) -> str:
+    """Which methods have an option that this one lacks."""
+    having = [other for other, solver in SOLVERS.items() if name in find_options(solver)]
+    text = f"the method {method!r} has no option {name}"
+    return f"{text}; {listed(having)} have it: add --method {having[0]}" if having else text
 
 
 def parse_weights(text: str) -> tuple[float, float, float]:

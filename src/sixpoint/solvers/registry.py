@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import inspect
+import re
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -36,6 +38,12 @@ SOLVERS: dict[str, Callable[..., Solver]] = {
 }
 """Name -> what makes the solver of a figure."""
 
+PERSON = re.compile(r"[a-z][\w.-]*(/[\w.-]+)*")
+"""A data set, or a person in one: ``cmu``, ``cmu/02``."""
+
+DEFAULT = "sik+"
+"""The method where none is named."""
+
 
 def find_solver(name: str) -> Callable[..., Solver]:
     """What makes a solver: a name of ``SOLVERS``, or ``module:attribute`` of a user's own.
@@ -56,6 +64,33 @@ def find_solver(name: str) -> Callable[..., Solver]:
     if not callable(found):
         raise SixpointError(f"{name!r}: the module {module} has no class or function {attribute!r}")
     return found  # type: ignore[no-any-return]
+
+
+def find_options(solver: Callable[..., Solver]) -> list[str]:
+    """Names of the options of a solver; the figure comes first and is none."""
+    parameters = list(inspect.signature(solver).parameters.values())[1:]
+    return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
+
+
+def find_fitted_on(name: str) -> tuple[str, ...]:
+    """The people that a method was fitted on, as ``("cmu/02", "mass")``: its attribute ``fitted_on``, if any.
+
+    A name is that of a data set, or of a person or recording in one: ``PERSON``.
+
+    Raises:
+        SixpointError: It declares something else.
+    """
+    solver = find_solver(name)
+    made = solver.func if isinstance(solver, partial) else solver
+    people = getattr(made, "fitted_on", ())
+    if not isinstance(people, tuple | list):
+        raise SixpointError(f"{name!r}: fitted_on must be a tuple of names such as 'cmu/02', got {people!r}")
+    for person in people:
+        if not (isinstance(person, str) and PERSON.fullmatch(person)):
+            raise SixpointError(
+                f"{name!r}: fitted_on names people as 'cmu/02', or a whole data set as 'mass', got {person!r}"
+            )
+    return tuple(people)
 
 
 def _import(module: str, name: str) -> Any:

@@ -34,20 +34,30 @@ def compute_local_rotations(figure: Figure, motion: Motion, joints: Sequence[int
     return rot.mul(turned, rot.inv(figure.neutral[list(joints)]))
 
 
-def compute_turning(figure: Figure, motion: Motion) -> Array:
-    """Speed (F,) of the pelvis about the world's vertical [rad/s], smoothed over 0.1 s.
+def wrap(angle: Array) -> Array:
+    """The same angles between -pi and pi [rad]."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
 
-    The heading is that of the pelvis' X axis, projected to the floor. Where that axis is nearly vertical, as
-    of a body that lies on its side, the heading is held: such frames add no turning.
+
+def compute_heading(figure: Figure, motion: Motion) -> Array:
+    """Angle (F,) about the world's vertical of the pelvis' X axis, projected to the floor [rad].
+
+    NaN where that axis is nearly vertical.
     """
     pelvis = figure.roles.pelvis
     world = rot.mul(motion.transforms[1][:, pelvis], rot.inv(figure.neutral[pelvis]))
     x, _, z = rot.mul_vec(world, [1.0, 0.0, 0.0]).T
-    upright = np.hypot(x, z) > UPRIGHT
-    step = np.arctan2(x[1:] * z[:-1] - z[1:] * x[:-1], x[1:] * x[:-1] + z[1:] * z[:-1])
-    steps = np.where(upright[1:] & upright[:-1], step, 0.0)
-    heading = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.abs(compute_velocity(heading, motion.rate, TURNING_HALF_SPAN))
+    return np.where(np.hypot(x, z) > UPRIGHT, np.arctan2(-z, x), np.nan)
+
+
+def compute_turning(figure: Figure, motion: Motion) -> Array:
+    """Speed (F,) of the pelvis about the world's vertical [rad/s], smoothed over 0.1 s.
+
+    Where there is no heading, as of a body that lies on its side, it is held: such frames add no turning.
+    """
+    steps = np.nan_to_num(wrap(np.diff(compute_heading(figure, motion))))
+    held = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.abs(compute_velocity(held, motion.rate, TURNING_HALF_SPAN))
 
 
 def find_swivel_jumps(figure: Figure, motion: Motion) -> NDArray[np.bool_]:

@@ -17,6 +17,7 @@ from sixpoint.jobs.compare.keys import digest, row_keys
 from sixpoint.jobs.compare.methods import Method
 from sixpoint.jobs.compare.report import write_report
 from sixpoint.jobs.compare.run import OpenClip, failed_row, open_clip, run_method
+from sixpoint.jobs.compare.splits import assign_splits
 from sixpoint.jobs.compare.store import RESULTS, Store
 from sixpoint.jobs.compare.study import Clip, Study
 from sixpoint.jobs.progress import Progress, silent
@@ -27,7 +28,7 @@ from sixpoint.study.comparison.results import rows_to_csv
 REPORT = ("report.html", "report.md")
 LIMITATIONS = (
     "Six positions do not tell the rotations of hands, feet and head, nor the pelvis' own yaw: all methods "
-    "but pik and pik-flext share one estimate of the pelvis, and its error.",
+    "but sik+, pik and pik-flext share one estimate of the pelvis, and its error.",
     "Methods are our own implementations with the presets above; where the papers are silent we chose, see "
     "docs/methods.md.",
     "Joint limits are those of the shipped table unless said otherwise; the truth itself leaves them, mostly "
@@ -77,9 +78,10 @@ def compare(
         progress: Told how far the work is.
 
     Raises:
-        SixpointError: The folder is not ours or holds results of another version, or nothing could be
-            measured.
+        SixpointError: The folder is not ours or holds results of another version, nothing could be measured,
+            or a method was fitted on what the study calls a test.
     """
+    splits = assign_splits(study.clips, study.methods)
     limits = None if limits_file is None else Limits.load(limits_file)
     store = Store(out, force)
     keys = row_keys(study, limits_file)
@@ -95,7 +97,8 @@ def compare(
                 row, run = _measure(clips, clip, method, study.limits, key, progress)
                 store.keep(row, run)
                 measured += 1
-            rows.append(replace(row, clip=clip.name, method=method.name))
+            where = replace(row, clip=clip.name, person=clip.person, split=splits[clip.name])
+            rows.append(replace(where, method=method.name))
             store.write_results(rows)
             progress("comparing", len(rows), total)
         clips.forget(clip)
@@ -185,6 +188,7 @@ def _gather(study: Study, rows: Sequence[Row], clips: _Clips, store: Store, prog
         tuple(drawn),
         study.reference,
         presets={method.name: method.preset for method in study.methods},
+        fitted_on={method.name: method.fitted_on for method in study.methods if method.fitted_on},
         facts=_facts(study),
         limitations=LIMITATIONS,
         notes=tuple(dict.fromkeys(notes)),
@@ -205,6 +209,7 @@ def _facts(study: Study) -> tuple[tuple[str, str], ...]:
         ("date", time.strftime("%Y-%m-%d")),
         ("joint limits", "on" if study.limits else "off"),
         ("clips", "; ".join(f"{clip.name}: {clip.file.name}" for clip in study.clips)),
+        ("people", "; ".join(f"{clip.name}: {clip.person or 'not known'}" for clip in study.clips)),
     )
 
 

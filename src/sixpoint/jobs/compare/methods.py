@@ -11,12 +11,12 @@ from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.base import Solver
 from sixpoint.solvers.jacobian.solver import DAMPING, REACH
-from sixpoint.solvers.registry import SOLVERS, find_solver
+from sixpoint.solvers.registry import SOLVERS, find_fitted_on, find_options, find_solver
 
 STOP = "stops at 1 cm, at a gain below 1 mm, or after 20 iterations"
 PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "sik": ({}, "closed form; the chord search is exact"),
-    "sik+": ({}, "constants chosen on other people's recordings, see benchmarks/tune_sik_plus.py"),
+    "sik+": ({}, "constants as benchmarks/tune_sik_plus.py chose them"),
     "tgbsik": ({}, "weight of twist 1; swivel searched on the whole circle by 0.1, then 0.01 rad"),
     "kma": ({}, f"from the standing pose; swivel angles zero; the spine's CCD {STOP}"),
     "ccd": ({}, f"from tip to root; {STOP}"),
@@ -43,35 +43,44 @@ class Method:
         solver: Name of ``SOLVERS``, or ``module:Class``.
         options: Its fixed options.
         preset: The same in words.
+        fitted_on: People whose recordings it was fitted on, as "cmu/02".
     """
 
     name: str
     solver: str
     options: Mapping[str, Any] = field(default_factory=dict)
     preset: str = ""
+    fitted_on: tuple[str, ...] = ()
 
     @classmethod
     def named(cls, solver: str, name: str = "", options: Mapping[str, Any] | None = None) -> Method:
         """A method by the name of its solver, with its preset and further options.
 
         Raises:
-            SixpointError: There is no such solver, or it has no such option.
+            SixpointError: There is no such solver or option, or it says wrongly what it was fitted on.
         """
         found = find_solver(solver)
         usual, text = PRESETS.get(solver, ({}, "the user's own"))
         if options:
             text = ", ".join(f"{key} {value}" for key, value in options.items()) + f"; {text}"
-        method = cls(name or solver.rpartition(":")[2], solver, {**usual, **(options or {})}, text)
-        unknown = [key for key in method.options if key not in _keywords(found)]
+        method = cls(
+            name or solver.rpartition(":")[2],
+            solver,
+            {**usual, **(options or {})},
+            text,
+            find_fitted_on(solver),
+        )
+        known = find_options(found)
+        unknown = [key for key in method.options if key not in known]
         if unknown and not _takes_more(found):
             raise SixpointError(
-                f"the method {solver!r} has no option {listed(unknown)}; it has: {listed(_keywords(found))}"
+                f"the method {solver!r} has no option {listed(unknown)}; it has: {listed(known)}"
             )
         return method
 
     def choose(self, limits: bool, weights: tuple[float, float, float] | None) -> dict[str, Any]:
         """Options of the solver: its own, and the study's limits and weights where it knows them."""
-        known = _keywords(find_solver(self.solver))
+        known = find_options(find_solver(self.solver))
         options = dict(self.options)
         if "limits" in known:
             options.setdefault("limits", limits)
@@ -90,12 +99,6 @@ class Method:
     def make(self, figure: Figure, limits: bool, weights: tuple[float, float, float] | None) -> Solver:
         """The solver of a figure."""
         return find_solver(self.solver)(figure, **self.choose(limits, weights))
-
-
-def _keywords(solver: Callable[..., Solver]) -> list[str]:
-    """Names of the options of a solver; the figure comes first and is none."""
-    parameters = list(inspect.signature(solver).parameters.values())[1:]
-    return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
 
 
 def _takes_more(solver: Callable[..., Solver]) -> bool:

@@ -105,6 +105,7 @@ def _delete_pictures(folder: Path, names: set[str]) -> list[str]:
 def build_document(comparison: Comparison, progress: Progress = silent) -> Document:
     """Everything the report says and shows; told of every picture."""
     from sixpoint.study.comparison.curves import has_window
+    from sixpoint.study.comparison.fitting import say_fitted
     from sixpoint.study.comparison.summary import summarise
     from sixpoint.study.document import Bullets, Document, Heading, Picture
 
@@ -112,7 +113,8 @@ def build_document(comparison: Comparison, progress: Progress = silent) -> Docum
     drawn = 0
     progress("drawing", drawn, total)
     blocks: list[Block] = [Heading("Summary"), Bullets(summarise(comparison))]
-    for block in chain(_results(comparison), _clips(comparison), _background(comparison)):
+    measured = (say_fitted(block, comparison) for block in chain(_results(comparison), _clips(comparison)))
+    for block in chain(measured, _background(comparison)):
         blocks.append(block)
         if isinstance(block, Picture) and drawn < total - 1:
             drawn += 1
@@ -124,17 +126,22 @@ def build_document(comparison: Comparison, progress: Progress = silent) -> Docum
 def _results(comparison: Comparison) -> Iterator[Block]:
     """Statements, errors, times and qualities over all clips, failures."""
     from sixpoint.study.comparison import measures, tables
-    from sixpoint.study.comparison.averages import QUANTITIES, averaged_clips
+    from sixpoint.study.comparison.averages import QUANTITIES, averaged_clips, clips_of
     from sixpoint.study.comparison.curves import encode
+    from sixpoint.study.comparison.fitting import USES, split_table
+    from sixpoint.study.comparison.model import TEST
     from sixpoint.study.comparison.trade import draw_trade
-    from sixpoint.study.document import Heading, Picture
+    from sixpoint.study.document import Heading, Paragraph, Picture
 
     if comparison.claims:
         yield Heading("Statements tested")
         yield tables.claim_table(comparison)
     yield Heading("Accuracy")
-    for quantity in QUANTITIES:
-        yield tables.error_table(comparison, quantity)
+    if not clips_of(comparison, TEST):
+        text = "A method was fitted on, or chosen by, each of these recordings: add others, or leave it out."
+        yield Paragraph(text, "No recording is left to test on.")
+    else:
+        yield from (tables.error_table(comparison, quantity) for quantity in QUANTITIES)
     canvas = draw_trade(comparison)
     if canvas is not None:
         caption = "Position error against the time of a frame, both logarithmic; lower left is better."
@@ -145,6 +152,11 @@ def _results(comparison: Comparison) -> Iterator[Block]:
         yield measures.time_table(comparison)
         yield Heading("Quality")
         yield measures.quality_table(comparison)
+    for split, use in USES.items():
+        table = split_table(comparison, split)
+        if table:
+            yield Heading(f"Recordings {use}")
+            yield table
     failures = tables.failure_table(comparison)
     if failures:
         yield Heading("Failures")

@@ -13,12 +13,18 @@ from sixpoint.body.tables import read_table
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES
 from sixpoint.jobs.compare.methods import METHODS, Method
+from sixpoint.jobs.compare.splits import find_person
 from sixpoint.jobs.reading import parse_frames
+from sixpoint.solvers.registry import PERSON
 from sixpoint.solvers.six_points.solver import check_weights
 from sixpoint.study.comparison.claims import CLAIMS
-from sixpoint.study.comparison.model import Reference
+from sixpoint.study.comparison.model import SPLITS, Reference
 
 MOTIONS = tuple(suffix for suffix in MOTION_SUFFIXES if suffix != ".asf")
+CLIP_KEYS = (
+    *("name", "file", "files", "skeleton", "frames", "weights", "sample", "window", "mapping", "note"),
+    *("person", "split"),
+)
 TOO_MANY = 500  # files of a folder: more were hardly meant
 
 
@@ -36,6 +42,8 @@ class Clip:
         window: Part of the curves that is drawn large, as first frame and end.
         mapping: TOML table of roles for an unusual rig.
         note: What a reader should know of it.
+        person: Whom it shows, as "cmu/14"; empty where that is not known.
+        split: "train", "development" or "test"; empty: whether a method was fitted on the person decides.
     """
 
     name: str
@@ -47,6 +55,8 @@ class Clip:
     window: tuple[int, int] | None = None
     mapping: Path | None = None
     note: str = ""
+    person: str = ""
+    split: str = ""
 
 
 @dataclass(frozen=True)
@@ -207,7 +217,7 @@ def study_of_files(
         if name in names[:k]:
             names[k] = f"{name} ({k + 1})"
     clips = [
-        Clip(name, path, frames=frames, weights=weights, **options)
+        Clip(name, path, frames=frames, weights=weights, person=find_person(path), **options)
         for name, path in zip(names, paths, strict=True)
     ]
     title = f"Comparison on {len(clips)} clips" if len(clips) > 1 else f"Comparison on {names[0]}"
@@ -225,8 +235,7 @@ def _motions_in(folder: Path) -> list[Path]:
 
 def _read_clip(row: _Entry, folder: Path) -> Clip | str:
     """The clip, or the names of its files where none is there."""
-    keys = ("name", "file", "files", "skeleton", "frames", "weights", "sample", "window", "mapping", "note")
-    row.check(keys)
+    row.check(CLIP_KEYS)
     if ("file" in row.table) == ("files" in row.table):
         raise row.error("a clip has either file = '...' or files = [{ file = '...' }, ...]")
     sources = row.tables("files") if "files" in row.table else [_Entry(row.path, row.where, row.table)]
@@ -256,8 +265,24 @@ def _read_clip(row: _Entry, folder: Path) -> Clip | str:
             row.numbers("window", 2, int),
             folder / mapping if mapping else None,
             source.get("note", str) or row.get("note", str) or "",
+            _read_person(row) or find_person(file),
+            _read_split(row),
         )
     return " or ".join(wanted)
+
+
+def _read_person(row: _Entry) -> str:
+    person = row.get("person", str) or ""
+    if person and not PERSON.fullmatch(person):
+        raise row.error(f"person must be a name such as 'cmu/14', got {person!r}")
+    return str(person)
+
+
+def _read_split(row: _Entry) -> str:
+    split = row.get("split", str) or ""
+    if split and split not in SPLITS:
+        raise row.error(f"split must be one of {listed(SPLITS)}, got {split!r}")
+    return str(split)
 
 
 def _say_missing(missing: Sequence[str], folder: Path) -> str:

@@ -123,6 +123,8 @@ class SequentialIKPlus(SixPointSolver):
         SixpointError: A constant has an impossible value, or there is no such effector.
     """
 
+    fitted_on = tuple(f"cmu/{person}" for person in ("02", "03", "05", "09", "11", "16", "29", "127"))
+
     _entry = staticmethod(solve_plus)
 
     def __init__(

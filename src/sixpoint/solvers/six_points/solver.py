@@ -55,6 +55,9 @@ class SixPointSolver(ABC):
         SixpointError: The weights make no sense.
     """
 
+    fitted_on: ClassVar[tuple[str, ...]] = ()
+    """People whose recordings its constants or model were fitted on, as "cmu/02"; see ``find_fitted_on``."""
+
     _entry: ClassVar[Callable[..., None]]
     _compiling: ClassVar[str] = "about ten seconds"
 

@@ -1,7 +1,8 @@
 """Means over clips, ours and published, and how well they agree: numbers that tables and pictures share.
 
-Clips that a reference averages are the ones averaged, so that both means are over the same clips. A method
-without a result on one of them has no mean: failures are never averaged away.
+Only test clips are averaged: none whose person any of the methods was fitted on. Clips that a reference
+averages are the ones averaged, so that both means are over the same clips. A method without a result on one
+of them has no mean: failures are never averaged away.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from math import isfinite, nan
 import numpy as np
 from scipy.stats import spearmanr
 
-from sixpoint.study.comparison.model import Comparison, Row
+from sixpoint.study.comparison.model import TEST, Comparison, Row
 
 AVERAGE = "average"
 """The clip of a ``Reference`` that is its printed average."""
@@ -45,6 +46,12 @@ def clip_names(comparison: Comparison) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
+def clips_of(comparison: Comparison, split: str) -> tuple[str, ...]:
+    """The clips of a split, in the order of the rows; one without a row is a test."""
+    splits = {row.clip: row.split for row in comparison.rows}
+    return tuple(name for name in clip_names(comparison) if splits.get(name, TEST) == split)
+
+
 def find_result(comparison: Comparison, clip: str, method: str) -> Row | None:
     """The row of a clip and method, if it has a result."""
     row = comparison.row(clip, method)
@@ -58,9 +65,9 @@ def explain_missing(comparison: Comparison, clip: str, method: str) -> str:
 
 
 def averaged_clips(comparison: Comparison) -> tuple[str, ...]:
-    """Clips with a result of some method; of those the reference has, if it has any."""
+    """Test clips with a result of some method; of those the reference has, if it has any."""
     some = {row.clip for row in comparison.rows if not row.error}
-    names = [name for name in clip_names(comparison) if name in some]
+    names = [name for name in clips_of(comparison, TEST) if name in some]
     known = comparison.reference.position if comparison.reference else {}
     return tuple([name for name in names if name in known] or names)
 

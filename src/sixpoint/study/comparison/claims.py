@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from sixpoint.study.comparison.averages import average
+from sixpoint.study.comparison.averages import average, clips_of
 from sixpoint.study.comparison.curves import TURN, find_turns
-from sixpoint.study.comparison.model import Claim, ClipRuns, Comparison
+from sixpoint.study.comparison.model import TEST, Claim, ClipRuns, Comparison
 
 Array = NDArray[np.float64]
 
@@ -176,9 +176,10 @@ def _swivel_jumps(c: Comparison) -> Iterator[Claim]:
 
 
 def _peaks_at_turns(c: Comparison) -> Iterator[Claim]:
+    tests = clips_of(c, TEST)
     for clip in c.clips:
         first, last = clip.window
-        if not clip.runs or last - first < MINIMUM:
+        if clip.name not in tests or not clip.runs or last - first < MINIMUM:
             continue
         error = np.mean([run.position[first:last] for run in clip.runs.values()], axis=0)
         peaks = find_peaks_apart(error, clip.rate)

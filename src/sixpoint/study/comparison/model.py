@@ -5,7 +5,7 @@ The report is a function of this alone, so an interrupted comparison can be draw
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import nan
 
@@ -16,6 +16,14 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 
 Array = NDArray[np.float64]
+
+SPLITS = TRAIN, DEVELOPMENT, TEST = ("train", "development", "test")
+"""What a clip is for: fitting methods, choosing among them, or testing them; only the last is averaged."""
+
+
+def is_fitted(person: str, fitted_on: Iterable[str]) -> bool:
+    """Whether a person is one of those, or of a data set that is."""
+    return any(person == name or person.startswith(f"{name}/") for name in fitted_on)
 
 
 @dataclass(frozen=True)
@@ -29,6 +37,8 @@ class Row:
         rate: Frames per second [Hz].
         key: Names what was measured: the files, frames and options of the clip, the method, and the code.
         options: Options that the solver was made with, as ``limits=True weights=1,1,0``.
+        person: Whom the clip shows, as "cmu/14"; empty where that is not known.
+        split: What the clip is for, one of ``SPLITS``; the same for all methods.
         error: Why there is no result; empty where there is one.
         failed_frames: Frames for which the method raised or gave numbers that are not finite.
         position: RMS over frames of the mean joint distance over H, E_p; see ``Figure.height``.
@@ -67,6 +77,8 @@ class Row:
     rate: float
     key: str = ""
     options: str = ""
+    person: str = ""
+    split: str = TEST
     error: str = ""
     failed_frames: int = 0
     position: float = nan
@@ -181,6 +193,7 @@ class Comparison:
         reference: Published numbers, if the study has them.
         claims: Statements tested, if the study has any.
         presets: Method -> its fixed parameters in words.
+        fitted_on: Method -> people it was fitted on, as "cmu/02"; methods fitted on nobody may be left out.
         facts: What it was measured on: (label, text) pairs: machine, versions, date, options.
         limitations: Known limitations, a sentence each.
         notes: Remarks on clips, a sentence each.
@@ -193,6 +206,7 @@ class Comparison:
     reference: Reference | None = None
     claims: tuple[Claim, ...] = ()
     presets: Mapping[str, str] = field(default_factory=dict)
+    fitted_on: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     facts: tuple[tuple[str, str], ...] = ()
     limitations: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

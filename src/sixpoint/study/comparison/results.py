@@ -12,7 +12,7 @@ from typing import Any
 from sixpoint.errors import FormatError
 from sixpoint.study.comparison.model import Row
 
-VERSION = 1
+VERSION = 2
 """Of the columns; a file of another version is not read."""
 COLUMNS = ("format", *(field.name for field in fields(Row)))
 HELP = "begin again with --force, or choose another folder with -o"

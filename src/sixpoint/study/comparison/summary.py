@@ -18,6 +18,7 @@ from sixpoint.study.comparison.averages import (
     published_average,
 )
 from sixpoint.study.comparison.curves import TURN, find_turns
+from sixpoint.study.comparison.fitting import describe_use, summarise_fitting
 from sixpoint.study.comparison.model import ClipRuns, Comparison
 from sixpoint.study.document import Paragraph
 
@@ -28,7 +29,7 @@ UNITS = {"position": "", "orientation": " rad"}
 
 def summarise(comparison: Comparison) -> tuple[Paragraph, ...]:
     """The findings, the most important first."""
-    found = [_describe_runs(comparison)]
+    found = [_describe_runs(comparison), summarise_fitting(comparison)]
     found += [_describe_best(comparison, quantity) for quantity in QUANTITIES]
     found += [_describe_times(comparison), *describe_reference(comparison), _describe_claims(comparison)]
     return tuple(paragraph for paragraph in found if paragraph.text)
@@ -140,7 +141,7 @@ def describe_clip(comparison: Comparison, clip: str, runs: ClipRuns | None) -> P
         text.append("The clip could not be read.")
     elif baseline(comparison) in runs.runs:
         text += _describe_turns(runs, baseline(comparison))
-    return Paragraph(" ".join(text))
+    return Paragraph(" ".join(filter(None, [*text, describe_use(comparison, clip)])))
 
 
 def _describe_turns(clip: ClipRuns, base: str) -> list[str]:

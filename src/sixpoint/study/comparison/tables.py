@@ -13,6 +13,7 @@ from sixpoint.study.comparison.averages import (
     average,
     averaged_clips,
     clip_names,
+    clips_of,
     correlate,
     divide,
     find_result,
@@ -22,7 +23,7 @@ from sixpoint.study.comparison.averages import (
     published_average,
 )
 from sixpoint.study.comparison.measures import NONE, OURS, THEIRS, describe_missing, number
-from sixpoint.study.comparison.model import Comparison, Row
+from sixpoint.study.comparison.model import TEST, Comparison, Row
 from sixpoint.study.document import BAD, BEST, GOOD, NEXT, Table
 
 ROUNDING = 1.1e-4  # of a mean of three numbers of four digits, and of the printed mean
@@ -43,7 +44,7 @@ def error_table(comparison: Comparison, quantity: str) -> Table:
     """Table 1 of the paper for a quantity: methods down, clips across, ours beside the published."""
     unit = "" if quantity == "position" else " [rad]"
     columns = []
-    for clip in clip_names(comparison):
+    for clip in clips_of(comparison, TEST):
         ours = [_own(comparison, clip, method, quantity) for method in comparison.methods]
         theirs = [published(comparison, quantity, clip, method) for method in comparison.methods]
         columns += _pair(clip, unit, ours, theirs)
