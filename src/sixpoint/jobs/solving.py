@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +9,11 @@ from typing import Any
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
-from sixpoint.body.targets import Targets
-from sixpoint.errors import SixpointError, listed
+from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.errors import SixpointError
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.solvers.base import MotionSolution
-from sixpoint.solvers.registry import find_solver, make_solver
+from sixpoint.solvers.registry import check_options, find_solver, make_solver
 
 
 @dataclass(frozen=True)
@@ -27,6 +26,7 @@ class Solving:
         search: "exact" or "literal"; None: the method's own.
         limits: Keep joints within their limits.
         limits_file: A table of joint limits in place of the shipped one.
+        rotations: Effectors whose measured rotations are used; none by default.
     """
 
     method: str = "sik"
@@ -34,6 +34,7 @@ class Solving:
     search: str | None = None
     limits: bool = True
     limits_file: Path | None = None
+    rotations: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse a method that does not exist, and options it does not have.
@@ -41,13 +42,10 @@ class Solving:
         Raises:
             SixpointError: The message lists the methods, or the options of the method.
         """
-        solver = find_solver(self.method)
+        find_solver(self.method)
         if not self.limits and self.limits_file is not None:
             raise SixpointError("--limits FILE and --no-limits exclude each other")
-        known = inspect.signature(solver).parameters
-        unknown = [name for name in self.options if name not in known]
-        if unknown:
-            raise SixpointError(f"the method {self.method!r} has no option {listed(unknown)}")
+        check_options(self.method, self.options)
         make_solver(self.method, Figure.from_stature(), **self.options)
 
     @property
@@ -57,6 +55,8 @@ class Solving:
         for name in ("weights", "search"):
             if getattr(self, name) is not None:
                 options[name] = getattr(self, name)
+        if self.rotations:
+            options["rotations"] = self.rotations
         return options
 
     def load_limits(self) -> Limits | None:
@@ -74,6 +74,12 @@ def parse_weights(text: str) -> tuple[float, float, float]:
             f"0.1,0.1,1; got {text!r}"
         ) from None
     return first, second, third
+
+
+def parse_rotations(text: str) -> tuple[str, ...]:
+    """Effectors as ``pelvis,head``, or ``all``; the solver says which there are."""
+    names = tuple(filter(None, (word.strip() for word in text.split(","))))
+    return EFFECTORS if names == ("all",) else names
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,27 @@ def _import(module: str, name: str) -> Any:
             sys.path.remove(here)
 
 
+def check_options(name: str, options: Iterable[str]) -> None:
+    """Refuse options that a method does not have.
+
+    Raises:
+        SixpointError: There is no such method, or it has no such option; the message names methods that do.
+    """
+    unknown = sorted(set(options) - _options_of(find_solver(name), options))
+    if unknown:
+        others = [other for other, solver in SOLVERS.items() if set(unknown) <= _options_of(solver, ())]
+        hint = f"; {listed(others)} has" if len(others) == 1 else f"; {listed(others)} have" if others else ""
+        raise SixpointError(f"the method {name!r} has no option {listed(unknown)}{hint}")
+
+
+def _options_of(solver: Callable[..., Solver], asked: Iterable[str]) -> set[str]:
+    """Names of a solver's options; all that are ``asked`` for where it takes any."""
+    parameters = list(inspect.signature(solver).parameters.values())
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
+    return {p.name for p in parameters[1:]} | (set(asked) if takes_any else set())
+
+
 def make_solver(name: str, figure: Figure, **options: Any) -> Solver:
-    """Make a solver by name; an unknown name is an error that lists those there are."""
+    """Make a solver by name; an unknown name or option is an error that lists what there is."""
+    check_options(name, options)
     return find_solver(name)(figure, **options)
