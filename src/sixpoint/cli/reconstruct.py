@@ -50,6 +50,13 @@ def reconstruct(
     search: Annotated[
         Literal["exact", "literal"] | None, Parameter(help="Of sik: how the bend of the spine is found.")
     ] = None,
+    rotations: Annotated[
+        str | None,
+        Parameter(
+            help="Trackers with six degrees of freedom: whose rotations are used too, of pelvis, head, l_wrist, "
+            "r_wrist, l_ankle, r_ankle, or `all`. Not every method takes them."
+        ),
+    ] = None,
     limits: LimitsFile = None,
     no_limits: NoLimits = False,
     mapping: Mapping = None,
@@ -75,6 +82,7 @@ def reconstruct(
     sixpoint reconstruct 17_10.amc -o boxing.bvh --picture boxing.png
     sixpoint reconstruct 90_05.bvh --frames 1: --extras
     sixpoint reconstruct kick.bvh --method sik --weights 1,1,0
+    sixpoint reconstruct walk.bvh --rotations pelvis,head
     sixpoint reconstruct points.csv --stature 1.68
     sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
     ```
@@ -82,7 +90,7 @@ def reconstruct(
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
     from sixpoint.jobs.reconstruct import Body
     from sixpoint.jobs.reconstruct import reconstruct as run
-    from sixpoint.jobs.solving import Solving, parse_weights
+    from sixpoint.jobs.solving import Solving, parse_rotations, parse_weights
 
     solving = Solving(
         method,
@@ -90,6 +98,7 @@ def reconstruct(
         search,
         limits=not no_limits,
         limits_file=limits,
+        rotations=() if rotations is None else parse_rotations(rotations),
     )
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
     screen = Screen()

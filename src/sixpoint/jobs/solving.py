@@ -9,11 +9,11 @@ from typing import Any
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
-from sixpoint.body.targets import Targets
+from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, listed
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.solvers.base import MotionSolution
-from sixpoint.solvers.registry import DEFAULT, SOLVERS, find_options, find_solver, make_solver
+from sixpoint.solvers.registry import DEFAULT, find_options, find_solver, make_solver, methods_with
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class Solving:
         search: "exact" or "literal"; None: the method's own.
         limits: Keep joints within their limits.
         limits_file: A table of joint limits in place of the shipped one.
+        rotations: Effectors whose measured rotations are used; none by default.
     """
 
     method: str = DEFAULT
@@ -33,6 +34,7 @@ class Solving:
     search: str | None = None
     limits: bool = True
     limits_file: Path | None = None
+    rotations: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse a method that does not exist, and options it does not have.
@@ -46,7 +48,9 @@ class Solving:
         known = find_options(solver)
         for name in self.options:
             if name not in known:
-                raise SixpointError(_explain_option(name, self.method))
+                having = methods_with(name)
+                hint = f"; {listed(having)} have it: add --method {having[0]}" if having else ""
+                raise SixpointError(f"the method {self.method!r} has no option {name}{hint}")
         make_solver(self.method, Figure.from_stature(), **self.options)
 
     @property
@@ -56,18 +60,13 @@ class Solving:
         for name in ("weights", "search"):
             if getattr(self, name) is not None:
                 options[name] = getattr(self, name)
+        if self.rotations:
+            options["rotations"] = self.rotations
         return options
 
     def load_limits(self) -> Limits | None:
         """The joint limits asked for; None is the shipped table."""
         return None if self.limits_file is None else Limits.load(self.limits_file)
-
-
-def _explain_option(name: str, method: str) -> str:
-    """Which methods have an option that this one lacks."""
-    having = [other for other, solver in SOLVERS.items() if name in find_options(solver)]
-    text = f"the method {method!r} has no option {name}"
-    return f"{text}; {listed(having)} have it: add --method {having[0]}" if having else text
 
 
 def parse_weights(text: str) -> tuple[float, float, float]:
@@ -80,6 +79,12 @@ def parse_weights(text: str) -> tuple[float, float, float]:
             f"0.1,0.1,1; got {text!r}"
         ) from None
     return first, second, third
+
+
+def parse_rotations(text: str) -> tuple[str, ...]:
+    """Effectors as ``pelvis,head``, or ``all``; the solver says which there are."""
+    names = tuple(filter(None, (word.strip() for word in text.split(","))))
+    return EFFECTORS if names == ("all",) else names
 
 
 @dataclass(frozen=True, eq=False)

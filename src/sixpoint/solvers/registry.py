@@ -105,6 +105,17 @@ def _import(module: str, name: str) -> Any:
             sys.path.remove(here)
 
 
+def methods_with(option: str) -> list[str]:
+    """The names of ``SOLVERS`` whose solvers have an option."""
+    return [name for name, solver in SOLVERS.items() if option in find_options(solver)]
+
+
 def make_solver(name: str, figure: Figure, **options: Any) -> Solver:
-    """Make a solver by name; an unknown name is an error that lists those there are."""
-    return find_solver(name)(figure, **options)
+    """Make a solver by name; an unknown name or option is an error that lists what there is."""
+    solver = find_solver(name)
+    for option in options:
+        having = methods_with(option)
+        if name in SOLVERS and name not in having:
+            hint = f"; {listed(having)} have it" if having else ""
+            raise SixpointError(f"the method {name!r} has no option {option}{hint}")
+    return solver(figure, **options)

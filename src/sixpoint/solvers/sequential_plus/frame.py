@@ -76,7 +76,7 @@ def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
     """Bring the head to its goal by the joints from ``first`` on; returns how far it is off [m].
 
     A head that is an end site and whose rotation is measured (``pinned``) has its joint rotated so; the
-    spine below reaches where that puts the joint.
+    spine below reaches where that puts the joint. With limits that counts for less than the head's place.
     """
     segments, balls = model.segments, model.balls
     hold = s.head_hold if is_measured(turned, 1) else 0.0
@@ -99,7 +99,7 @@ def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
         could = turn_end(last, qt.load(world, last - 1), turned, 1, s.limits, balls, local)
         place_trunk(segments, local, world, segs)
         off = vec.norm(vec.sub(goal, chord_of(segs)))
-        if could and off <= ALIGN:
+        if not s.limits or (could and off <= ALIGN):
             return off
     return close_trunk(segments, balls, s.limits, goal, first, DAMPING, s.low_joint, hold, local, world, segs)
 
