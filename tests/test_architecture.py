@@ -33,7 +33,7 @@ LIBRARIES = {
     "samples": {"numpy", "scipy"},
     "signals": {"numpy", "scipy"},
     "solvers": {"numpy"},
-    "study": {"numpy", "scipy", "matplotlib"},
+    "study": {"numpy", "scipy", "matplotlib", "torch"},
     "jobs": {"numpy"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
@@ -69,7 +69,7 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich"}:
+        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch"}:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

@@ -123,7 +123,9 @@ def test_a_frame_without_rotations_is_posed_by_positions():
     solver = sp.SequentialIKPlus(figure, limits=False, rotations=sp.EFFECTORS)
     points, unknown = targets.positions[0], np.full((6, 4), np.nan)
     plain = sp.SequentialIKPlus(figure, limits=False).solve(points).pose
-    np.testing.assert_allclose(solver.solve(points, rotations=unknown).pose.rotations, plain.rotations, atol=1e-12)
+    np.testing.assert_allclose(
+        solver.solve(points, rotations=unknown).pose.rotations, plain.rotations, atol=1e-12
+    )
     gaps = np.array(targets.rotations)
     gaps[20:40] = np.nan
     gaps[45, 1] = 0.0  # no rotation at all
@@ -219,7 +221,7 @@ def test_the_command_line_takes_rotations(tmp_path, monkeypatch, capsys):
     assert off.max() < 1e-3
     assert main([*words, "--rotations", "pelvis, head"]) == 0
     for wrong, message in (
-        (["reconstruct", "turning.bvh", "--rotations", "head"], "sik+"),
+        (["reconstruct", "turning.bvh", "--method", "sik", "--rotations", "head"], "sik+"),
         ([*words, "--rotations", "nose"], "l_wrist"),
         (["reconstruct", "points.csv", "--method", "sik+", "--rotations", "head"], "rotations of head"),
     ):

@@ -43,6 +43,7 @@ from sixpoint.solvers.prioritized.tasks import (
 from sixpoint.solvers.registry import SOLVERS, make_solver
 from sixpoint.solvers.sequential.solver import SequentialIK
 from sixpoint.solvers.sequential_plus.solver import Habits, SequentialIKPlus
+from sixpoint.solvers.sequential_prior.solver import SequentialIKPrior
 from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.solvers.tgb.limb import AnalyticLimb
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
@@ -89,6 +90,7 @@ __all__ = [
     "PrioritizedIK",
     "SequentialIK",
     "SequentialIKPlus",
+    "SequentialIKPrior",
     "SixpointError",
     "Skeleton",
     "SkeletonError",

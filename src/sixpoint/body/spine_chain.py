@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 COINCIDENT = 1e-3  # joints nearer than this [m] are at the same place
+CHEST, NECK, HEAD = 3.0, 5.0, 6.0  # stations of the trunk, those of a spine of three joints and a neck of two
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,3 +61,22 @@ class SpineChain:
         if len(points) < 2:
             raise FigureError("pelvis and head are at the same place: the trunk has no length")
         return cls(tuple(joints), frozen(np.diff(points, axis=0)), node)  # type: ignore[arg-type]
+
+    def stations(self, chest: int) -> Array:
+        """Where each joint stands in any trunk: 0 the pelvis, 3 the chest, 5 the top of the neck, 6 the head.
+
+        Joints between stand at even distances, so that a curve of the trunk that is given by rotations at the
+        seven stations can be carried over to any number of joints.
+
+        Args:
+            chest: The joint of the chain that carries the arms.
+
+        Returns:
+            (S,) station of each joint.
+        """
+        last = len(self.joints) - 1
+        turned = max(self.node.values()) == last > chest  # the last joint is the head's: an end site follows
+        necks = last - chest - turned
+        out = [CHEST * k / max(chest, 1) for k in range(chest + 1)]
+        out += [CHEST + (NECK - CHEST) * k / necks for k in range(1, necks + 1)]
+        return np.array(out + [HEAD] * turned)

@@ -92,3 +92,53 @@ def sik(
     screen.say(f"written to {out}{os.sep}: {', '.join(path.name for path in done.files)}")
     screen.say("next:", style="bold")
     screen.rows([(f"read {done.files[-1]}", "what is seen, with its numbers")])
+
+
+@study.command
+def prior(
+    *,
+    data: Annotated[
+        Path, Parameter(help="Folder with the recordings: cmu/02_01.amc and so on, mass/*.bvh.")
+    ] = Path("data"),
+    people: Annotated[
+        str | None,
+        Parameter(help="Whom to fit on, as cmu/02,cmu/05,mass; those of the shipped prior by default."),
+    ] = None,
+    steps: Annotated[int, Parameter(help="Steps of each of the two fits.")] = 1200,
+    seed: Annotated[int, Parameter(help="Of all that is random.")] = 0,
+    fetch: Annotated[
+        bool, Parameter(negative="", help="Download the trials of the CMU database that are not there.")
+    ] = False,
+    out: Annotated[Path, Parameter(help="Folder to write into.")] = Path("study/prior"),
+    force: Force = False,
+) -> None:
+    """Fit the prior of sik-prior anew from recordings: a file of numbers and its model card.
+
+    Needs PyTorch: `pip install 'sixpoint[fit]'`. Takes some minutes on one core. The file is used by
+    `SequentialIKPrior(figure, prior="study/prior/prior.npz")`.
+
+    For example:
+
+    ```
+    sixpoint study prior --fetch --people cmu/02,cmu/03,cmu/05,cmu/09,cmu/11,cmu/16,cmu/29,cmu/127
+    ```
+    """
+    from sixpoint.errors import SixpointError
+    from sixpoint.jobs.prior_study import COLUMNS, study_prior
+    from sixpoint.solvers.sequential_prior.solver import SequentialIKPrior
+
+    chosen = SequentialIKPrior.fitted_on
+    if people is not None:
+        chosen = tuple(filter(None, (word.strip() for word in people.split(","))))
+    if not chosen or steps < 1:
+        raise SixpointError("give at least one person and one step")
+    screen = Screen()
+    with screen.progress() as progress:
+        done = study_prior(
+            out, data, people=chosen, steps=steps, seed=seed, fetch=fetch, force=force, progress=progress
+        )
+    screen.table(COLUMNS, [score.cells for score in done.scores], texts=(0,))
+    screen.say()
+    screen.say(f"written to {out}{os.sep}: {', '.join(path.name for path in done.files)}")
+    screen.say("next:", style="bold")
+    screen.rows([(f"read {done.files[-1]}", "what it was fitted on, and what to expect of it")])

@@ -20,11 +20,13 @@ from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
 from sixpoint.solvers.sequential.solver import SequentialIK
 from sixpoint.solvers.sequential_plus.solver import SequentialIKPlus
+from sixpoint.solvers.sequential_prior.solver import SequentialIKPrior
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
 
 SOLVERS: dict[str, Callable[..., Solver]] = {
     "sik": SequentialIK,
     "sik+": SequentialIKPlus,
+    "sik-prior": SequentialIKPrior,
     "tgbsik": TGBSequentialIK,
     "kma": KulpaMultonArnaldi,
     "ccd": CyclicCoordinateDescent,

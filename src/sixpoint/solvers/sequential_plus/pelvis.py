@@ -6,10 +6,16 @@ the vertical; X is told by lines that count by their lengths, by where the hands
 goes. What is told is low-passed in time before its direction is taken, so that a short line moves little.
 """
 
+from math import atan2
+
+from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 
 UP = (0.0, 1.0, 0.0)
+CHEST = 0.75  # height of the chest's point between pelvis and head
+TOLD = 0.02  # m, lines that tell less than this tell nothing
+RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 
 
 @helper
@@ -49,3 +55,46 @@ def tell_x(filled, y, chest, velocity, wrist_line, ankle_line, reach, speed):
         if filled[i, 3] > 0.0:
             forward = vec.madd(forward, 0.5 * reach, vec.sub(vec.load(filled, i), chest))
     return vec.reject(vec.add(told, vec.cross(y, forward)), y)
+
+
+@helper
+def turn_at_most(before, x, y, most):
+    """X axis on its way about ``y`` from where it was [rad]; both across y, ``before`` may be zero."""
+    angle = atan2(vec.dot(vec.cross(before, x), y), vec.dot(before, x))
+    if vec.norm(before) < 0.5 or abs(angle) <= most:
+        return x
+    return qt.mul_vec(qt.from_axis_angle(y, most if angle > 0.0 else -most), before)
+
+
+@helper
+def estimate_pelvis(filled, memory, s):
+    """X and Y axes of the pelvis; updates what is remembered of X."""
+    pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
+    began = memory[4, 0] > 0.0
+    chord = vec.unit(vec.sub(head, pelvis))
+    if vec.norm(chord) < 0.5:
+        chord = vec.load(memory, 5) if began else (0.0, 1.0, 0.0)
+    y = estimate_y(filled, chord, s.chord_share, s.leg_share)
+    chest = vec.madd(pelvis, CHEST, vec.sub(head, pelvis))
+    velocity = vec.load(memory, 6)
+    if began and filled[0, 3] > 0.0:
+        now = vec.scale(s.rate, vec.sub(pelvis, vec.load(memory, 2)))
+        if vec.norm(now) > RUN:
+            now = vec.scale(RUN / vec.norm(now), now)
+        velocity = vec.add(vec.scale(s.kept_speed, velocity), vec.scale(1.0 - s.kept_speed, now))
+    vec.store(memory, 6, velocity)
+    told = tell_x(filled, y, chest, velocity, s.wrist_line, s.ankle_line, s.reach, s.speed)
+    if memory[4, 1] > 0.0:
+        told = vec.add(vec.scale(s.kept, vec.load(memory, 1)), vec.scale(1.0 - s.kept, told))
+    x = vec.reject(told, y)
+    if vec.norm(x) >= TOLD:
+        memory[4, 1] = 1.0
+    else:
+        x = vec.reject(vec.load(memory, 0) if began else (1.0, 0.0, 0.0), y)
+        if vec.norm(x) < 0.1:
+            x = vec.reject((0.0, 0.0, -1.0), y)
+    vec.store(memory, 1, told)
+    x = vec.unit(x)
+    if began:
+        x = turn_at_most(vec.unit(vec.reject(vec.load(memory, 0), y)), x, y, s.turn_speed * s.dt)
+    return x, y, chord

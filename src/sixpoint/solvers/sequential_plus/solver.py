@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from math import exp
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,7 +126,7 @@ class SequentialIKPlus(SixPointSolver):
 
     fitted_on = tuple(f"cmu/{person}" for person in ("02", "03", "05", "09", "11", "16", "29", "127"))
 
-    _entry = staticmethod(solve_plus)
+    _entry: ClassVar[Callable[..., None]] = staticmethod(solve_plus)
 
     def __init__(
         self,

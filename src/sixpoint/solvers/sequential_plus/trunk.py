@@ -37,7 +37,7 @@ def twist_to_wrists(filled, pelvis_x, axis, share, largest):
 
 
 @helper
-def start_trunk(segments, wanted, twist, bend_share, neck_curve, local, world, segs, flat):
+def bend_spine(segments, wanted, twist, bend_share, neck_curve, local, world, segs, flat):
     """Spine with its twist spread evenly and a share of the bend that would give the wanted distance."""
     count = segments.shape[0]
     for k in range(1, count):
@@ -138,7 +138,12 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
                 free = q
                 q, changed = clamp(balls, k, q)
                 if changed:  # by the sine of half the excess
-                    segs[k, 3] /= 1.0 + YIELD * sqrt(max(1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2, 0.0))
+                    segs[k, 3] /= 1.0 + YIELD * sqrt(
+                        max(
+                            1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2,
+                            0.0,
+                        )
+                    )
             qt.store(local, k, q)
         place_trunk(segments, local, world, segs)
         error = vec.sub(goal, chord_of(segs))
