@@ -105,7 +105,7 @@ def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
 
 
 @helper
-def pose_trunk(model, s, filled, turned, local, memory, world, segs, flat, residual):
+def pose_trunk(model, s, filled, turned, local, memory, world, segs, residual):
     """Pelvis and spine; returns the place of the pelvis."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
@@ -119,7 +119,7 @@ def pose_trunk(model, s, filled, turned, local, memory, world, segs, flat, resid
     goal = vec.sub(head, pelvis)
     wanted = vec.norm(goal)
     twist = twist_to_wrists(filled, x, chord, twist_share, TWIST)
-    start_trunk(model.segments, wanted, twist, bend_share, s.neck_curve, local, world, segs, flat)
+    start_trunk(model.segments, wanted, twist, bend_share, s.neck_curve, local, world, segs)
     pinned = False
     if is_measured(turned, 1):
         relative = qt.inv_mul(qt.load(local, 0), qt.load(turned, 1))
@@ -165,7 +165,7 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
     count = segs.shape[0]
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
-    root = pose_trunk(model, s, filled, turned, local, memory, world, segs, scratch.flat, residual)
+    root = pose_trunk(model, s, filled, turned, local, memory, world, segs, residual)
     if turned.shape[0] > 0 and not s.head_site:
         turn_end(end_row(count, 0), qt.load(world, count - 1), turned, 1, s.limits, model.balls, local)
     for limb in range(4):
@@ -244,8 +244,6 @@ def solve_plus(
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(
-            model, s, points[f], turned[f], local, memory, residual[f], scratch
-        )
+        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], local, memory, residual[f], scratch)
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])

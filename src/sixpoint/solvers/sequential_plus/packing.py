@@ -6,7 +6,7 @@ from sixpoint.kernels.jit import helper
 
 
 class Settings(NamedTuple):
-    """Whether limits hold, the constants (see ``solver.Habits``), and what follows from frame time and figure.
+    """Whether limits hold, the constants (``solver.Habits``), and what follows from frame time and figure.
 
     Attributes:
         kept: Share of what told X that is kept over the frame.

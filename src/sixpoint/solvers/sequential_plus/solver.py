@@ -38,7 +38,7 @@ class Habits:
         reach: Weight of how far the hands are before the chest.
         speed: Weight of the pelvis' velocity [s].
         twist_share: Share of the angle to the wrists' line by which the thorax turns.
-        bend_share: Share of Sequential IK's bend that the trunk begins with.
+        bend_share: Share of the bend of an arc that is as short as the trunk, with which it begins.
         low_joint: Weight of the lowest spine joint in closing the trunk; the highest has one.
         neck_curve: Angle by which the base of the neck leans back and its top forward, at rest [rad].
         elbow_out: Outward part of an elbow's direction.
@@ -60,8 +60,8 @@ class Habits:
         knee_toes: How much it points where the toes do.
         knee_foot: How much the knee's axis follows the foot's lateral one.
         knee_tilt: How much it follows the foot's vertical axis.
-        swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it is
-            zero across the line and grows without bound along it [s].
+        swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it
+            is zero across the line and grows without bound along it [s].
         swivel_speed: Largest change of a swivel angle, but for what limits ask [rad/s].
         turn_speed: Largest speed of the pelvis about its Y [rad/s].
         memory: Time constant of what tells the pelvis' X axis [s].
@@ -75,9 +75,9 @@ class Habits:
     reach: float = 3.35
     speed: float = 0.5
     twist_share: float = 0.225
-    bend_share: float = 0.1
+    bend_share: float = 0.03
     low_joint: float = 1.8
-    neck_curve: float = 0.35
+    neck_curve: float = 0.32
     elbow_out: float = 0.05
     elbow_down: float = 1.25
     elbow_back: float = 0.6

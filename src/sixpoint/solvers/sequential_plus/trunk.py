@@ -9,7 +9,6 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import clamp
-from sixpoint.solvers.sequential.bending import plane_components, search_angle
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 
 ROUNDS = 8  # Newton steps at most
@@ -37,19 +36,17 @@ def twist_to_wrists(filled, pelvis_x, axis, share, largest):
 
 
 @helper
-def start_trunk(segments, wanted, twist, bend_share, neck_curve, local, world, segs, flat):
-    """Spine with its twist spread evenly and a share of the bend that would give the wanted distance."""
+def start_trunk(segments, wanted, twist, bend_share, neck_curve, local, world, segs):
+    """Spine with its twist spread evenly, and bent forward by a share of what an arc as short would be."""
     count = segments.shape[0]
     for k in range(1, count):
         qt.store(local, k, qt.IDENTITY)
     place_trunk(segments, local, world, segs)
     if count < 2:
         return
-    bend = 0.0
-    if wanted < vec.norm(chord_of(segs)):
-        along = plane_components(segs, qt.x_axis(qt.load(local, 0)), flat)
-        phi, _ = search_angle(segments, flat, along, wanted, False)
-        bend = -2.0 * phi / (count - 1) * bend_share
+    length = vec.norm(chord_of(segs))
+    # An arc of angle a is shorter than its length by the share a^2 / 24.
+    bend = bend_share * sqrt(24.0 * max(1.0 - wanted / length, 0.0)) / (count - 1)
     turn = qt.mul(qt.from_axis_angle(Y, twist / (count - 1)), qt.from_axis_angle(X, bend))
     for k in range(1, count):
         qt.store(local, k, turn)
@@ -72,6 +69,13 @@ def solve_three(a, b, c, d, e, f, v):
 
 
 @helper
+def half_sine(a, b):
+    """Sine of half the angle between two rotations."""
+    x, y, z, _ = qt.inv_mul(a, b)
+    return vec.norm((x, y, z))
+
+
+@helper
 def shortened(segs, first, lever, force):
     """The share of a step by which no joint turns more than a step may; ``force`` makes half turns."""
     largest = 0.0
@@ -87,8 +91,9 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
     """Turn the spine by the least angles that bring the head to ``goal`` (from the pelvis) [m].
 
     Gauss-Newton steps of least weighted norm. Joints turn from the ``first`` on: 1, or 0 if the pelvis turns
-    too. ``low`` is the weight of the lowest joint, one that of the highest. ``hold`` is how much of the turns' sum, the turn of the spine's top, is avoided: 0 none of it,
-    1 all. Returns how far the head is off [m].
+    too. ``low`` is the weight of the lowest joint, one that of the highest. ``hold`` is how much of the
+    turns' sum, the turn of the spine's top, is avoided: 0 none of it, 1 all. The fourth numbers of ``segs``
+    are the joints' weights. Returns how far the head is off [m].
     """
     count = segments.shape[0]
     error = vec.sub(goal, chord_of(segs))
@@ -138,7 +143,12 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
                 free = q
                 q, changed = clamp(balls, k, q)
                 if changed:  # by the sine of half the excess
-                    segs[k, 3] /= 1.0 + YIELD * sqrt(max(1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2, 0.0))
+                    segs[k, 3] /= 1.0 + YIELD * sqrt(
+                        max(
+                            1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2,
+                            0.0,
+                        )
+                    )
             qt.store(local, k, q)
         place_trunk(segments, local, world, segs)
         error = vec.sub(goal, chord_of(segs))
