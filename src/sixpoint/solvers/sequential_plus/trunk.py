@@ -102,9 +102,9 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
     slope = (1.0 - low) / max(count - 2, 1)
     for k in range(first, count):
         segs[k, 3] = low + slope * max(k - 1, 0)
-    for _ in range(ROUNDS):
+    for step in range(ROUNDS):
         size = vec.dot(error, error)
-        if size < CLOSED * CLOSED:
+        if size < CLOSED * CLOSED and (step > 0 or not limits):
             break
         a = damping + FAR * size
         b, c, d, e, f = 0.0, 0.0, a, 0.0, a
@@ -139,16 +139,11 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
             # Half the turn with a 1, normalised: exact to third order, which is enough for a step.
             x, y, z = qt.inv_mul_vec(qt.load(world, k - 1), turn) if k > 0 else turn
             q = qt.normalised(qt.mul((x, y, z, 1.0), qt.load(local, k)))
-            if limits:
-                free = q
+            if limits:  # a joint that is turned back counts less in the next step
+                wanted = q
                 q, changed = clamp(balls, k, q)
-                if changed:  # by the sine of half the excess
-                    segs[k, 3] /= 1.0 + YIELD * sqrt(
-                        max(
-                            1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2,
-                            0.0,
-                        )
-                    )
+                if changed:
+                    segs[k, 3] /= 1.0 + YIELD * half_sine(wanted, q)
             qt.store(local, k, q)
         place_trunk(segments, local, world, segs)
         error = vec.sub(goal, chord_of(segs))
