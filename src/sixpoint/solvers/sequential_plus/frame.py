@@ -155,7 +155,7 @@ def point_limb(s, limb, n, frame, turned):
     end = qt.inv_mul(frame, qt.load(turned, limb + 2))
     if limb < 2:
         return pole_of_end(n, pole, end, side, s.elbow_hand, s.elbow_palm, s.elbow_grip, s.elbow_tilt)
-    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, s.knee_foot, s.knee_tilt)
+    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, 0.0, s.knee_tilt)
 
 
 @helper

@@ -44,7 +44,6 @@ class Settings(NamedTuple):
     elbow_tilt: float
     knee_shank: float
     knee_toes: float
-    knee_foot: float
     knee_tilt: float
     swivel_memory: float
     swivel_speed: float
@@ -96,6 +95,5 @@ def unpack_settings(options):
         options[33],
         options[34],
         options[35],
-        options[36],
-        options[37] > 0.0,
+        options[36] > 0.0,
     )

@@ -58,8 +58,7 @@ class Habits:
         elbow_tilt: How much it follows the hand's long axis.
         knee_shank: How much a knee points along the foot's vertical axis.
         knee_toes: How much it points where the toes do.
-        knee_foot: How much the knee's axis follows the foot's lateral one.
-        knee_tilt: How much it follows the foot's vertical axis.
+        knee_tilt: How much the knee's axis follows the foot's vertical one.
         swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it
             is zero across the line and grows without bound along it [s].
         swivel_speed: Largest change of a swivel angle, but for what limits ask [rad/s].
@@ -83,20 +82,19 @@ class Habits:
     elbow_back: float = 0.6
     elbow_lift: float = 1.05
     knee_out: float = 0.0
-    known_twist: float = 0.45
+    known_twist: float = 0.4
     known_bend: float = 0.0
-    head_twist: float = 1.25
-    head_bend: float = 0.325
-    head_rise: float = 5.25
+    head_twist: float = 1.6
+    head_bend: float = 0.6
+    head_rise: float = 7.5
     head_hold: float = 0.75
-    elbow_hand: float = 0.75
-    elbow_palm: float = -0.525
-    elbow_grip: float = 0.075
-    elbow_tilt: float = -0.525
-    knee_shank: float = 1.095
-    knee_toes: float = 0.9
-    knee_foot: float = 0.0
-    knee_tilt: float = 0.15
+    elbow_hand: float = 0.6
+    elbow_palm: float = -0.45
+    elbow_grip: float = 0.3
+    elbow_tilt: float = -0.5
+    knee_shank: float = 1.0
+    knee_toes: float = 0.8
+    knee_tilt: float = 0.1
     swivel_memory: float = 0.01
     swivel_speed: float = 20.0
     turn_speed: float = 15.0
