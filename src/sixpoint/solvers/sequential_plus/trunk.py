@@ -13,8 +13,8 @@ from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 
 ROUNDS = 8  # Newton steps at most
 CLOSED = 1e-7  # m
-FAR = 0.05  # how much the damping grows with the square of the distance
-HALF_STEP = 0.2  # rad, half the largest turn of a joint in one step
+FAR = 0.01  # how much the damping grows with the square of the distance
+HALF_STEP = 0.15  # rad, half the largest turn of a joint in one step
 YIELD = 40.0  # how much less a joint counts in the next step that its limits turned back
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
@@ -76,17 +76,6 @@ def half_sine(a, b):
 
 
 @helper
-def shortened(segs, first, lever, force):
-    """The share of a step by which no joint turns more than a step may; ``force`` makes half turns."""
-    largest = 0.0
-    for k in range(first, segs.shape[0]):
-        turn = vec.cross(lever, force)
-        largest = max(largest, segs[k, 3] * segs[k, 3] * vec.dot(turn, turn))
-        lever = vec.sub(lever, vec.load(segs, k))
-    return HALF_STEP / sqrt(largest) if largest > HALF_STEP * HALF_STEP else 1.0
-
-
-@helper
 def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local, world, segs):
     """Turn the spine by the least angles that bring the head to ``goal`` (from the pelvis) [m].
 
@@ -132,10 +121,12 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
             f -= w * (x * x + y * y)
             lever = vec.sub(lever, middle)
         force = vec.scale(0.5, solve_three(a, b, c, d, e, f, error))
-        force = vec.scale(shortened(segs, first, lever, force), force)
         for k in range(first, count):
             turn = vec.scale(segs[k, 3], vec.cross(lever, force))
             lever = vec.sub(lever, vec.load(segs, k))
+            size = vec.dot(turn, turn)
+            if size > HALF_STEP * HALF_STEP:
+                turn = vec.scale(HALF_STEP / sqrt(size), turn)
             # Half the turn with a 1, normalised: exact to third order, which is enough for a step.
             x, y, z = qt.inv_mul_vec(qt.load(world, k - 1), turn) if k > 0 else turn
             q = qt.normalised(qt.mul((x, y, z, 1.0), qt.load(local, k)))
