@@ -57,7 +57,6 @@ MEASURED_STEPS = {
     "elbow_tilt": 0.3,
     "knee_shank": 0.3,
     "knee_toes": 0.3,
-    "knee_foot": 0.3,
     "knee_tilt": 0.3,
 }
 TRACKED = (sp.EFFECTORS[:1], sp.EFFECTORS[:2], sp.EFFECTORS)

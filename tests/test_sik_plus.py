@@ -52,11 +52,11 @@ def test_the_trunk_closes_by_small_turns(shift, limits):
     """From rest the head gets to a near goal exactly; what is off is told."""
     count = len(MODEL.segments)
     local = np.tile([0.0, 0, 0, 1], (count, 1))
-    world, segs, flat = np.empty((count, 4)), np.empty((count, 4)), np.empty((count, 4))
+    world, segs = np.empty((count, 4)), np.empty((count, 4))
     rest = MODEL.segments[:, :3].sum(axis=0)
     goal = 0.97 * rest + shift
     goal *= min(1.0, 0.98 * np.linalg.norm(MODEL.segments[:, :3], axis=1).sum() / np.linalg.norm(goal))
-    trunk.bend_spine(MODEL.segments, float(np.linalg.norm(goal)), 0.0, 0.1, 0.2, local, world, segs, flat)
+    trunk.bend_spine(MODEL.segments, float(np.linalg.norm(goal)), 0.0, 0.1, 0.2, local, world, segs)
     off = trunk.close_trunk(
         MODEL.segments, MODEL.balls, limits, tuple(goal), 1, 1e-6, 1.8, 0.0, local, world, segs
     )

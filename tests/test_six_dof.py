@@ -83,7 +83,7 @@ def angles(figure: sp.Figure, motion: sp.Motion, rotations: np.ndarray) -> np.nd
 @pytest.mark.parametrize("named", [sp.EFFECTORS, ("pelvis",), ("head", "r_ankle"), ("l_wrist",)])
 @pytest.mark.parametrize("name", FIGURES)
 def test_measured_rotations_are_met_exactly(name, named):
-    """Without limits every named effector has the rotation that was measured; the six points are still met."""
+    """Without limits every named effector has its measured rotation; the six points are still met."""
     figure = FIGURES[name]
     targets = figure.targets(turning(figure))
     solved = sp.SequentialIKPlus(figure, limits=False, rotations=named).solve_frames(targets)
@@ -93,7 +93,7 @@ def test_measured_rotations_are_met_exactly(name, named):
 
 
 def test_limits_hold_and_hands_are_met_with_them():
-    """Wrists and ankles have no limits, so that their rotations are met with limits on; the head keeps its own."""
+    """Wrists and ankles have no limits: their rotations are met with limits on; the head keeps its own."""
     figure = FIGURES["built-in"]
     targets = figure.targets(turning(figure))
     motion = sp.SequentialIKPlus(figure, rotations=sp.EFFECTORS).solve_motion(targets)
@@ -117,7 +117,7 @@ def test_only_named_rotations_are_read(seed, named):
 
 
 def test_a_frame_without_rotations_is_posed_by_positions():
-    """A first frame whose rotations are unknown is that of positions alone; later ones are met again at once."""
+    """A first frame without rotations is that of positions alone; later ones are met again at once."""
     figure = FIGURES["built-in"]
     targets = figure.targets(turning(figure))
     solver = sp.SequentialIKPlus(figure, limits=False, rotations=sp.EFFECTORS)
@@ -202,7 +202,7 @@ def test_missing_and_unknown_rotations_are_errors():
         solver.solve_motion(replace(targets, rotations=gone))
     with pytest.raises(sp.TargetError, match="rotations must be"):
         solver.solve(targets.positions[0], rotations=np.zeros((5, 4)))
-    with pytest.raises(sp.SixpointError, match="no effector named nose.*l_wrist"):
+    with pytest.raises(sp.SixpointError, match=r"no effector named nose.*l_wrist"):
         sp.SequentialIKPlus(figure, rotations=("nose",))
     with pytest.raises(sp.SixpointError, match=r"'sik' has no option rotations; .*sik\+"):
         sp.make_solver("sik", figure, rotations=("head",))

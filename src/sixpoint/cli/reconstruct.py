@@ -53,8 +53,8 @@ def reconstruct(
     rotations: Annotated[
         str | None,
         Parameter(
-            help="Trackers with six degrees of freedom: whose rotations are used too, of pelvis, head, l_wrist, "
-            "r_wrist, l_ankle, r_ankle, or `all`. Not every method takes them."
+            help="Whose rotations are used too, as trackers of six degrees of freedom measure them: `all`, "
+            "or some of pelvis,head,l_wrist,r_wrist,l_ankle,r_ankle. With sik+ and sik-prior."
         ),
     ] = None,
     limits: LimitsFile = None,

@@ -57,7 +57,7 @@ def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
 
 
 @helper
-def start_trunk(model, s, filled, turned, local, memory, world, segs, flat):
+def start_trunk(model, s, filled, turned, local, memory, world, segs):
     """Pelvis and spine before the spine closes on the head; returns the pelvis' X and the chord's direction."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
@@ -69,7 +69,7 @@ def start_trunk(model, s, filled, turned, local, memory, world, segs, flat):
         twist_share, bend_share = s.known_twist, s.known_bend
     wanted = vec.norm(vec.sub(head, pelvis))
     twist = twist_to_wrists(filled, x, chord, twist_share, TWIST)
-    bend_spine(model.segments, wanted, twist, bend_share, s.neck_curve, local, world, segs, flat)
+    bend_spine(model.segments, wanted, twist, bend_share, s.neck_curve, local, world, segs)
     if turned.shape[0] > 0:
         qt.store(local, end_row(segs.shape[0], 0), qt.IDENTITY)
     if is_measured(turned, 1):
@@ -116,7 +116,7 @@ def point_limb(s, limb, n, frame, turned):
     end = qt.inv_mul(frame, qt.load(turned, limb + 2))
     if limb < 2:
         return pole_of_end(n, pole, end, side, s.elbow_hand, s.elbow_palm, s.elbow_grip, s.elbow_tilt)
-    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, s.knee_foot, s.knee_tilt)
+    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, 0.0, s.knee_tilt)
 
 
 @helper
@@ -176,7 +176,7 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
-    x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs, scratch.flat)
+    x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0

@@ -36,7 +36,7 @@ def leg_pole(side, out):
 
 @helper
 def carried_angle(n, u, h, upper, hinge, l1, l2):
-    """Swivel angle from u about n of a limb that was posed so, its line turned to n the shortest way [rad]."""
+    """Swivel angle from u about n of a limb that was posed so, its line turned to n by the shortest arc."""
     before, _ = direction(end_of(upper, hinge, l1, l2))
     x = qt.x_axis(upper)
     r = vec.scale(h, vec.cross(n, qt.mul_vec(qt.arc(before, n, x), x)))
@@ -123,7 +123,8 @@ def solve_by_pole(
 
     Arguments as of ``tgb.swivel.solve_at``; the pole's part across the limb's line is of length 1 where it is
     clear. ``upper`` and ``hinge`` are the rotations of the last frame, if it ``began`` before; the others as
-    of ``approach``. Returns the local rotations of root and hinge and the end's position in the parent's frame.
+    of ``approach``. Returns the local rotations of root and hinge, and the end's position in the parent's
+    frame.
     """
     n, distance = direction(target)
     d, cosine, sine, flexion = triangle(distance, l1, l2)

@@ -6,7 +6,7 @@ from sixpoint.kernels.jit import helper
 
 
 class Settings(NamedTuple):
-    """Whether limits hold, the constants (see ``solver.Habits``), and what follows from frame time and figure.
+    """Whether limits hold, the constants (``solver.Habits``), and what follows from frame time and figure.
 
     Attributes:
         kept: Share of what told X that is kept over the frame.
@@ -44,7 +44,6 @@ class Settings(NamedTuple):
     elbow_tilt: float
     knee_shank: float
     knee_toes: float
-    knee_foot: float
     knee_tilt: float
     swivel_memory: float
     swivel_speed: float
@@ -96,6 +95,5 @@ def unpack_settings(options):
         options[33],
         options[34],
         options[35],
-        options[36],
-        options[37] > 0.0,
+        options[36] > 0.0,
     )

@@ -39,7 +39,7 @@ class Habits:
         reach: Weight of how far the hands are before the chest.
         speed: Weight of the pelvis' velocity [s].
         twist_share: Share of the angle to the wrists' line by which the thorax turns.
-        bend_share: Share of Sequential IK's bend that the trunk begins with.
+        bend_share: Share of the bend of an arc that is as short as the trunk, with which it begins.
         low_joint: Weight of the lowest spine joint in closing the trunk; the highest has one.
         neck_curve: Angle by which the base of the neck leans back and its top forward, at rest [rad].
         elbow_out: Outward part of an elbow's direction.
@@ -59,10 +59,9 @@ class Habits:
         elbow_tilt: How much it follows the hand's long axis.
         knee_shank: How much a knee points along the foot's vertical axis.
         knee_toes: How much it points where the toes do.
-        knee_foot: How much the knee's axis follows the foot's lateral one.
-        knee_tilt: How much it follows the foot's vertical axis.
-        swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it is
-            zero across the line and grows without bound along it [s].
+        knee_tilt: How much the knee's axis follows the foot's vertical one.
+        swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it
+            is zero across the line and grows without bound along it [s].
         swivel_speed: Largest change of a swivel angle, but for what limits ask [rad/s].
         turn_speed: Largest speed of the pelvis about its Y [rad/s].
         memory: Time constant of what tells the pelvis' X axis [s].
@@ -76,28 +75,27 @@ class Habits:
     reach: float = 3.35
     speed: float = 0.5
     twist_share: float = 0.225
-    bend_share: float = 0.1
+    bend_share: float = 0.03
     low_joint: float = 1.8
-    neck_curve: float = 0.35
+    neck_curve: float = 0.32
     elbow_out: float = 0.05
     elbow_down: float = 1.25
     elbow_back: float = 0.6
     elbow_lift: float = 1.05
     knee_out: float = 0.0
-    known_twist: float = 0.45
+    known_twist: float = 0.4
     known_bend: float = 0.0
-    head_twist: float = 1.25
-    head_bend: float = 0.325
-    head_rise: float = 5.25
+    head_twist: float = 1.6
+    head_bend: float = 0.6
+    head_rise: float = 7.5
     head_hold: float = 0.75
-    elbow_hand: float = 0.75
-    elbow_palm: float = -0.525
-    elbow_grip: float = 0.075
-    elbow_tilt: float = -0.525
-    knee_shank: float = 1.095
-    knee_toes: float = 0.9
-    knee_foot: float = 0.0
-    knee_tilt: float = 0.15
+    elbow_hand: float = 0.6
+    elbow_palm: float = -0.45
+    elbow_grip: float = 0.3
+    elbow_tilt: float = -0.5
+    knee_shank: float = 1.0
+    knee_toes: float = 0.8
+    knee_tilt: float = 0.1
     swivel_memory: float = 0.01
     swivel_speed: float = 20.0
     turn_speed: float = 15.0

@@ -9,13 +9,12 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import clamp
-from sixpoint.solvers.sequential.bending import plane_components, search_angle
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 
 ROUNDS = 8  # Newton steps at most
 CLOSED = 1e-7  # m
-FAR = 0.05  # how much the damping grows with the square of the distance
-HALF_STEP = 0.2  # rad, half the largest turn of a joint in one step
+FAR = 0.01  # how much the damping grows with the square of the distance
+HALF_STEP = 0.15  # rad, half the largest turn of a joint in one step
 YIELD = 40.0  # how much less a joint counts in the next step that its limits turned back
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
@@ -37,19 +36,17 @@ def twist_to_wrists(filled, pelvis_x, axis, share, largest):
 
 
 @helper
-def bend_spine(segments, wanted, twist, bend_share, neck_curve, local, world, segs, flat):
-    """Spine with its twist spread evenly and a share of the bend that would give the wanted distance."""
+def bend_spine(segments, wanted, twist, bend_share, neck_curve, local, world, segs):
+    """Spine with its twist spread evenly, and bent forward by a share of what an arc as short would be."""
     count = segments.shape[0]
     for k in range(1, count):
         qt.store(local, k, qt.IDENTITY)
     place_trunk(segments, local, world, segs)
     if count < 2:
         return
-    bend = 0.0
-    if wanted < vec.norm(chord_of(segs)):
-        along = plane_components(segs, qt.x_axis(qt.load(local, 0)), flat)
-        phi, _ = search_angle(segments, flat, along, wanted, False)
-        bend = -2.0 * phi / (count - 1) * bend_share
+    length = vec.norm(chord_of(segs))
+    # An arc of angle a is shorter than its length by the share a^2 / 24.
+    bend = bend_share * sqrt(24.0 * max(1.0 - wanted / length, 0.0)) / (count - 1)
     turn = qt.mul(qt.from_axis_angle(Y, twist / (count - 1)), qt.from_axis_angle(X, bend))
     for k in range(1, count):
         qt.store(local, k, turn)
@@ -72,14 +69,10 @@ def solve_three(a, b, c, d, e, f, v):
 
 
 @helper
-def shortened(segs, first, lever, force):
-    """The share of a step by which no joint turns more than a step may; ``force`` makes half turns."""
-    largest = 0.0
-    for k in range(first, segs.shape[0]):
-        turn = vec.cross(lever, force)
-        largest = max(largest, segs[k, 3] * segs[k, 3] * vec.dot(turn, turn))
-        lever = vec.sub(lever, vec.load(segs, k))
-    return HALF_STEP / sqrt(largest) if largest > HALF_STEP * HALF_STEP else 1.0
+def half_sine(a, b):
+    """Sine of half the angle between two rotations."""
+    x, y, z, _ = qt.inv_mul(a, b)
+    return vec.norm((x, y, z))
 
 
 @helper
@@ -87,8 +80,9 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
     """Turn the spine by the least angles that bring the head to ``goal`` (from the pelvis) [m].
 
     Gauss-Newton steps of least weighted norm. Joints turn from the ``first`` on: 1, or 0 if the pelvis turns
-    too. ``low`` is the weight of the lowest joint, one that of the highest. ``hold`` is how much of the turns' sum, the turn of the spine's top, is avoided: 0 none of it,
-    1 all. Returns how far the head is off [m].
+    too. ``low`` is the weight of the lowest joint, one that of the highest. ``hold`` is how much of the
+    turns' sum, the turn of the spine's top, is avoided: 0 none of it, 1 all. The fourth numbers of ``segs``
+    are the joints' weights. Returns how far the head is off [m].
     """
     count = segments.shape[0]
     error = vec.sub(goal, chord_of(segs))
@@ -97,9 +91,9 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
     slope = (1.0 - low) / max(count - 2, 1)
     for k in range(first, count):
         segs[k, 3] = low + slope * max(k - 1, 0)
-    for _ in range(ROUNDS):
+    for step in range(ROUNDS):
         size = vec.dot(error, error)
-        if size < CLOSED * CLOSED:
+        if size < CLOSED * CLOSED and (step > 0 or not limits):
             break
         a = damping + FAR * size
         b, c, d, e, f = 0.0, 0.0, a, 0.0, a
@@ -127,23 +121,20 @@ def close_trunk(segments, balls, limits, goal, first, damping, low, hold, local,
             f -= w * (x * x + y * y)
             lever = vec.sub(lever, middle)
         force = vec.scale(0.5, solve_three(a, b, c, d, e, f, error))
-        force = vec.scale(shortened(segs, first, lever, force), force)
         for k in range(first, count):
             turn = vec.scale(segs[k, 3], vec.cross(lever, force))
             lever = vec.sub(lever, vec.load(segs, k))
+            size = vec.dot(turn, turn)
+            if size > HALF_STEP * HALF_STEP:
+                turn = vec.scale(HALF_STEP / sqrt(size), turn)
             # Half the turn with a 1, normalised: exact to third order, which is enough for a step.
             x, y, z = qt.inv_mul_vec(qt.load(world, k - 1), turn) if k > 0 else turn
             q = qt.normalised(qt.mul((x, y, z, 1.0), qt.load(local, k)))
-            if limits:
-                free = q
+            if limits:  # a joint that is turned back counts less in the next step
+                wanted = q
                 q, changed = clamp(balls, k, q)
-                if changed:  # by the sine of half the excess
-                    segs[k, 3] /= 1.0 + YIELD * sqrt(
-                        max(
-                            1.0 - (free[0] * q[0] + free[1] * q[1] + free[2] * q[2] + free[3] * q[3]) ** 2,
-                            0.0,
-                        )
-                    )
+                if changed:
+                    segs[k, 3] /= 1.0 + YIELD * half_sine(wanted, q)
             qt.store(local, k, q)
         place_trunk(segments, local, world, segs)
         error = vec.sub(goal, chord_of(segs))

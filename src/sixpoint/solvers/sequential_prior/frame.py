@@ -172,7 +172,7 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
-    _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs, scratch.flat)
+    _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
     trust = ask_prior(model, s, facts, places, turns, turned, filled, chord, memory, thought, local)
     place_trunk(model.segments, local, world, segs)
     x = qt.x_axis(qt.load(local, 0))

@@ -1,0 +1,150 @@
+"""What measured rotations bring SIK+, and how steady it is: two tables of docs/results.md.
+
+    python benchmarks/sik_plus_table.py [--data FOLDER] [--held] [--write]
+
+Rotations are exact: those of the recording, limits off. Without ``--held`` the paper's clips are measured
+too; ``--write`` brings the tables into docs/results.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+import sixpoint as sp
+from sixpoint.study.metrics import measured_joints
+from sixpoint.study.movement import find_swivel_jumps
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT.parent / "shared" / "data"
+RESULTS = ROOT / "docs" / "results.md"
+
+PAPER = {
+    "boxing": ("paper/17_10.amc", 0),
+    "jump kick": ("paper/90_05_repaired.bvh", 1),
+    "playground": ("paper/01_03.amc", 0),
+}
+WEIGHTS = {"boxing": (1.0, 1.0, 0.0), "jump kick": (1.0, 1.0, 0.0)}
+GIVEN = {
+    "positions only": (),
+    "+ pelvis": sp.EFFECTORS[:1],
+    "+ pelvis, head": sp.EFFECTORS[:2],
+    "+ pelvis, head, feet": (*sp.EFFECTORS[:2], *sp.EFFECTORS[4:]),
+    "+ all six": sp.EFFECTORS,
+}
+ROUNDS = 7
+
+
+def load(folder: Path, held: bool) -> dict[str, list[tuple[sp.Figure, sp.Motion]]]:
+    """Name of a set -> its recordings."""
+    files = {} if held else {name: [clip] for name, clip in PAPER.items()}
+    files["CMU person 14"] = [(f"cmu/{p.name}", 0) for p in sorted((folder / "cmu").glob("14_*.amc"))]
+    files["Bandai Namco"] = [(f"bandai/{p.name}", 0) for p in sorted((folder / "bandai").glob("*.bvh"))]
+    files["Xsens"] = [(f"xsens/{p.name}", 0) for p in sorted((folder / "xsens").glob("*.bvh"))]
+    out = {}
+    for name, clips in files.items():
+        motions = [sp.load(folder / file).sliced(slice(skip, None)) for file, skip in clips]
+        out[name] = [(sp.Figure.from_motion(motion), motion) for motion in motions]
+    return out
+
+
+def table_rotations(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
+    """Errors by what is given beside the positions."""
+    paper = [name for name in sets if name in PAPER]
+    names = [*paper, *(["**average of the paper's**"] if paper else []), *(n for n in sets if n not in PAPER)]
+    lines = [f"| rotations given | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    for given, rotations in GIVEN.items():
+        found = {}
+        for name, clips in sets.items():
+            errors = [
+                sp.compute_errors(
+                    figure,
+                    motion,
+                    sp.SequentialIKPlus(figure, limits=False, rotations=rotations).solve_motion(
+                        figure.targets(motion)
+                    ),
+                )
+                for figure, motion in clips
+            ]
+            found[name] = np.mean([(e.position, e.orientation) for e in errors], axis=0)
+        if paper:
+            found["**average of the paper's**"] = np.mean([found[name] for name in paper], axis=0)
+        cells = [f"{found[name][0]:.4f} / {found[name][1]:.4f}" for name in names]
+        lines.append(f"| {given} | {' | '.join(cells)} |")
+    return lines
+
+
+def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -> tuple[float, float]:
+    """Mean, and root of the mean square, of the joints' acceleration errors [m/s^2]."""
+    joints = measured_joints(figure)
+    off = np.diff(result.positions[:, joints] - truth.positions[:, joints], n=2, axis=0) * truth.rate**2
+    size = np.linalg.norm(off, axis=-1)
+    return float(size.mean()), float(np.sqrt(np.mean(size**2)))
+
+
+def table_steady(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
+    """Jumps, acceleration errors and time beside Sequential IK."""
+    lines = [
+        "| recordings | limits | jumps: `sik` | `sik+` | truth | acceleration error, m/s^2: `sik` | `sik+` "
+        "| us per frame: `sik` | `sik+` | ratio |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for limits in (False, True):
+        for name, clips in sets.items():
+            jumps, errors, times = np.zeros(3, int), [], []
+            for figure, motion in clips:
+                targets = figure.targets(motion)
+                weights = {"weights": WEIGHTS[name]} if name in WEIGHTS else {}
+                solvers = (
+                    sp.SequentialIK(figure, limits=limits, **weights),
+                    sp.SequentialIKPlus(figure, limits=limits),
+                )
+                results = [solver.solve_motion(targets) for solver in solvers]
+                jumps += [find_swivel_jumps(figure, m).sum() for m in (*results, motion)]
+                errors.append([acceleration_error(figure, motion, m) for m in results])
+                times.append(time_solvers(solvers, targets))
+            error, spent = np.mean(errors, axis=0), np.mean(times, axis=0)
+            lines.append(
+                f"| {name} | {'on' if limits else 'off'} | {jumps[0]} | {jumps[1]} | {jumps[2]} "
+                f"| {error[0, 0]:.1f} (RMS {error[0, 1]:.1f}) | {error[1, 0]:.1f} (RMS {error[1, 1]:.1f}) "
+                f"| {spent[0]:.2f} | {spent[1]:.2f} | {spent[1] / spent[0]:.2f} |"
+            )
+    return lines
+
+
+def time_solvers(solvers: tuple[sp.Solver, ...], targets: sp.Targets) -> list[float]:
+    """Time per frame of ``solve_frames``, the least of some rounds in turn [us]."""
+    spent = [np.inf] * len(solvers)
+    for _ in range(ROUNDS):
+        for k, solver in enumerate(solvers):
+            start = time.perf_counter()
+            solver.solve_frames(targets)
+            spent[k] = min(spent[k], (time.perf_counter() - start) / len(targets) * 1e6)
+    return spent
+
+
+def main() -> None:
+    """Print the tables, and write them if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=DATA)
+    parser.add_argument("--held", action="store_true", help="leave the paper's clips alone")
+    parser.add_argument("--write", action="store_true", help="into docs/results.md")
+    options = parser.parse_args()
+    sets = load(options.data, options.held)
+    text = RESULTS.read_text("utf-8")
+    for mark, make in (("rotations", table_rotations), ("steady", table_steady)):
+        lines = make(sets)
+        print("\n".join(lines), "\n")
+        if options.write:
+            begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
+            before, after = text.split(begin)[0], text.split(end)[1]
+            text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
+    if options.write:
+        RESULTS.write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main()
