@@ -36,8 +36,8 @@ def reconstruct(
     method: Annotated[
         str,
         Parameter(
-            help="How to solve: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik or pik-flext; "
-            "`module:Class` for your own."
+            help="How to solve: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, pik, pik-flext or "
+            "hybrid; `module:Class` for your own."
         ),
     ] = "sik",
     weights: Annotated[

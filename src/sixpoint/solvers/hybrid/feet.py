@@ -1,27 +1,28 @@
 """Which feet stand, and where: contact of the ankles with hysteresis, frame by frame, from the past alone.
 
-An ankle that is low and slow is held where it became so, horizontally: its height is followed, as it rises when
-the foot rolls over its ball. If it goes on before it has stood for three frames and 25 ms, it was not standing.
-Once it has, it is let go when it is fast, clearly off the floor, or far from where it is held; what it is off
-by then fades out in 0.1 s.
+An ankle that is low and slow is held where it became so, horizontally: its height is followed, as it rises
+when the foot rolls over its ball. If it goes on before it has stood for three frames and 25 ms, it was not
+standing. Once it has, it is let go when it is fast, clearly off the floor, or far from where it is held; what
+it is off by then fades out in 0.1 s.
 
 ``signals.contacts`` sees the same with central differences. Here speeds are those of the recent past, and so
 later: beginning counts from a higher speed, low-passed less, than ending does.
 
 ``memory`` (12, 4) has six rows a foot, left before right: where the ankle was, and whether it was seen; its
-quick velocity, and whether there is one; its slow velocity; where the foot is held, and ``FREE``, ``TRYING`` or
-``STANDING``; what it was off by when let go, and the time since; height of its floor, whether one is known,
-frames and time of being low and slow.
+quick velocity, and whether there is one; its slow velocity; where the foot is held, and ``FREE``, ``TRYING``
+or ``STANDING``; what it was off by when let go, and the time left of that; height of its floor, whether one
+is known, frames and time of being low and slow. All zero is nothing known.
 """
 
 from math import exp, inf
 
 from sixpoint.kernels import vector as vec
-from sixpoint.kernels.jit import entry, helper
+from sixpoint.kernels.jit import helper
 
 ROWS = 6
 FREE, TRYING, STANDING = 0.0, 1.0, 2.0
 FOLLOWING, HELD, EASING = 0.0, 1.0, 2.0
+ANKLES = 4  # the left one among the six points
 LOW, HIGH = 0.03, 0.06  # m over the floor, to begin below and to end above
 SLOW, FAST = 0.2, 0.25  # m/s, to begin below and to end above
 QUICK, CALM = 0.0125, 0.025  # s, time constants of the two velocities
@@ -35,9 +36,9 @@ FAR = 1e7  # m, a point farther away than this, or not a number, counts as lost
 
 
 @helper
-def fading(age):
-    """Share of what a foot was off by that is left: 1 at once, 0 after ``EASE``, smooth at both ends."""
-    left = max(1.0 - age / EASE, 0.0)
+def fading(time):
+    """Share of what a foot was off by that is left, ``time`` before it is none: smooth at both ends."""
+    left = time / EASE
     return left * left * (3.0 - 2.0 * left)
 
 
@@ -81,7 +82,7 @@ def place_foot(memory, row, other, here, last, dt):
     ready = moved and up < LOW and vec.norm(vec.load(memory, row + 1)) < SLOW
     memory[row + 5, 2] = memory[row + 5, 2] + 1.0 if ready else 0.0
     memory[row + 5, 3] = memory[row + 5, 3] + max(dt, 0.0) if ready else 0.0
-    memory[row + 4, 3] += max(dt, 0.0)
+    memory[row + 4, 3] = max(memory[row + 4, 3] - max(dt, 0.0), 0.0)
     anchor = vec.load(memory, row + 3)
     gap = vec.sub((anchor[0], last[1], anchor[2]), last)
     if memory[row + 3, 3] != FREE:
@@ -90,7 +91,7 @@ def place_foot(memory, row, other, here, last, dt):
         slid = vec.norm(vec.sub((anchor[0], here[1], anchor[2]), here)) > SLID
         if fast or lifted or slid or (memory[row + 3, 3] == TRYING and not ready):
             vec.store(memory, row + 4, gap)
-            memory[row + 4, 3] = max(dt, 0.0)
+            memory[row + 4, 3] = max(EASE - max(dt, 0.0), 0.0)
             memory[row + 3, 3] = FREE
             ready = False
     share = fading(memory[row + 4, 3])
@@ -111,37 +112,38 @@ def forget(memory, row):
     memory[row, 3] = 0.0
     memory[row + 1, 3] = 0.0
     memory[row + 3, 3] = FREE
-    memory[row + 4, 3] = EASE
+    memory[row + 4, 3] = 0.0
     memory[row + 5, 2] = 0.0
     memory[row + 5, 3] = 0.0
 
 
-@entry
-def hold_feet(points, dt, floor, memory, feet):
-    """Write where the ankles of every frame belong, and why: ``FOLLOWING``, ``HELD`` or ``EASING``.
+@helper
+def is_seen(points, k):
+    """Whether a point is known; false for NaN."""
+    return abs(points[k, 0]) < FAR and abs(points[k, 1]) < FAR and abs(points[k, 2]) < FAR
 
-    ``points`` (F, 6, 3) [m], ``dt`` time between frames [s], ``floor`` its height [m] or infinity where it is
-    to be learnt; ``memory`` becomes that after the last frame; ``feet`` (F, 2, 4).
+
+@helper
+def hold_feet(points, dt, floor, memory):
+    """Where left and right ankle belong in a frame of points (6, 3) [m], each with why.
+
+    ``dt`` is the time since the last frame [s] and ``floor`` a height [m], infinite where it is to be learnt.
+    Nothing can be said of a lost ankle: it follows.
     """
-    for f in range(points.shape[0]):
-        lasts = (vec.load(memory, 0), vec.load(memory, ROWS))
-        for k in range(2):
-            row, here = ROWS * k, vec.load(points[f], 4 + k)
-            if abs(here[0]) < FAR and abs(here[1]) < FAR and abs(here[2]) < FAR:
-                if memory[row, 3] == 0.0:
-                    memory[row + 4, 3] = EASE
-                follow(memory, row, here, dt)
-                learn_floor(memory, row, here[1], dt, floor)
-                vec.store(memory, row, here)
-                memory[row, 3] = 1.0
-            else:
-                forget(memory, row)
-        for k in range(2):
-            row, here = ROWS * k, vec.load(points[f], 4 + k)
-            if memory[row, 3] == 0.0:
-                vec.store(feet[f], k, here)
-                feet[f, k, 3] = FOLLOWING
-                continue
-            place, why = place_foot(memory, row, ROWS * (1 - k), here, lasts[k], dt)
-            vec.store(feet[f], k, place)
-            feet[f, k, 3] = why
+    lasts = (vec.load(memory, 0), vec.load(memory, ROWS))
+    for k in range(2):
+        row, here = ROWS * k, vec.load(points, ANKLES + k)
+        if is_seen(points, ANKLES + k):
+            follow(memory, row, here, dt)
+            learn_floor(memory, row, here[1], dt, floor)
+            vec.store(memory, row, here)
+            memory[row, 3] = 1.0
+        else:
+            forget(memory, row)
+    left, right = vec.load(points, ANKLES), vec.load(points, ANKLES + 1)
+    why_left, why_right = FOLLOWING, FOLLOWING
+    if memory[0, 3] > 0.0:
+        left, why_left = place_foot(memory, 0, ROWS, left, lasts[0], dt)
+    if memory[ROWS, 3] > 0.0:
+        right, why_right = place_foot(memory, ROWS, 0, right, lasts[1], dt)
+    return left, why_left, right, why_right

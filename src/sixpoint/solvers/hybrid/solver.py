@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Solver, Status
-from sixpoint.solvers.hybrid.feet import FAR, FREE, HELD, ROWS, hold_feet
-from sixpoint.solvers.hybrid.levels import FOLLOWING, SEEN, STANDING, TURNED, build_tasks
+from sixpoint.solvers.hybrid.feet import ROWS
+from sixpoint.solvers.hybrid.goals import write_goals
+from sixpoint.solvers.hybrid.levels import build_tasks, find_led
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.engine.packing import ACCEPT, TASK, pack_settings
 from sixpoint.solvers.prioritized.goals import Goals, GoalTable
@@ -42,18 +42,17 @@ class HybridIK:
     """A reconstruction whose feet stand, hands keep contact, obstacles and balance hold.
 
     Another solver of the six points poses the figure first. Its pose is where prioritized IK starts in each
-    frame and what it is drawn back to; that takes the rest in a few iterations. Feet that stand
-    (``hybrid.feet``) do not slide. Levels: 0 feet and floor; 10 the pelvis and 11 its turn; 20 legs; 30 arms; 40
-    head. World Y must be up.
+    frame and what it is drawn back to; a few iterations do the rest. Feet that stand (``hybrid.feet``) do not
+    slide. Levels: 0 feet and floor; 10 pelvis, 11 its turn; 20 legs; 30 arms; 40 head. World Y must be up.
 
     Args:
         figure: What to pose.
-        tasks: More constraints, each at a level of its own; those at 2 to 9 come after the feet and before the
-            pelvis.
+        tasks: More constraints, each at a level of its own; those at 2 to 9 come after the feet and before
+            the pelvis.
         start: The solver of the reconstruction, for the same figure; ``SequentialIKPlus`` by default.
         contacts: Hold feet that stand.
-        floor: Height of the floor [m]: no ankle comes nearer to it than the rig's sole allows, and a foot whose
-            ankle is 12 cm above it does not stand. Without it the floor is where each ankle was lowest.
+        floor: Height of the floor [m]: no ankle comes nearer to it than the rig's sole allows, and a foot
+            whose ankle is 12 cm above it does not stand. Without it the floor is where each ankle was lowest.
         limits: Keep every joint within its limits.
         iterations: Most iterations of a frame.
         dofs: What prioritized IK may move; a figure has its own. ``figure.full_dofs()`` adds forearms, wrists
@@ -91,15 +90,16 @@ class HybridIK:
         self._engine = Engine(lower(self._body, every, posture, limits), len(every))
         settings = build_settings(posture, bool(limits), 1.0, 1.0, 0.1, 1e-4, iterations, 0)
         self._settings = pack_settings(settings._replace(drift=iterations))
-        self._base_goals = GoalTable(own).default
+        self._base_goals = GoalTable(every).default
         self._task_goals = GoalTable(tasks)
+        self._led = find_led(tasks)
         self._measured = [*range(6), *range(len(own), len(every))]
         self._accepted = self._find_accepted()
         self.names: tuple[str, ...] = (*EFFECTORS, *(task.label for task in tasks))
         legs, between = figure.roles.limbs[2:], figure.offset_between
-        self._hips = np.array([between(figure.roles.pelvis, hip) for hip, _, _ in legs])
         lengths = [np.linalg.norm(between(a, b)) + np.linalg.norm(between(b, c)) for a, b, c in legs]
-        self._reach = STRETCH * np.array(lengths)
+        hips = [between(figure.roles.pelvis, hip) for hip, _, _ in legs]
+        self._legs = np.column_stack([hips, STRETCH * np.array(lengths)])
 
     def solve(
         self,
@@ -115,8 +115,8 @@ class HybridIK:
             points: (6, 3) positions of the effectors in the order of ``EFFECTORS`` [m]; NaN where lost.
             previous: The solution of the frame before, if any.
             dt: Time since that frame [s]; zero or less counts as no time.
-            goals: Goals of the tasks in this frame, see ``PrioritizedIK.compute_goals``; those left out keep the
-                task's own.
+            goals: Goals of the tasks in this frame, see ``PrioritizedIK.compute_goals``; those left out keep
+                the task's own.
 
         Returns:
             The pose; residuals are those of the six points, then those of the tasks, as in ``names``.
@@ -127,8 +127,10 @@ class HybridIK:
         """
         frame = as_points(points)[None]
         before, memory = self._split(previous)
-        begun = self.start.solve(frame[0], before, dt)
-        out = self._refine(frame, self._body.state_of(begun.pose)[None], dt, memory, goals)
+        given = self._task_goals.compute({} if goals is None else goals)
+        wanted = self._lead(frame, given)
+        begun = self.start.solve(wanted[0], before, dt)
+        out = self._refine(frame, wanted, self._body.state_of(begun.pose)[None], dt, memory, given)
         moving, translations = self._body.place_base(out.rotations, out.positions)
         pose = Pose(self._body.rig, out.rotations[0], translations[0], moving)
         state = (*begun.state, memory)
@@ -145,16 +147,18 @@ class HybridIK:
             goals: Goals of the tasks, the same in all frames; see ``solve``.
         """
         frames, dt = len(targets), 1.0 / targets.rate
-        begun = self.start.solve_motion(targets)
+        given = self._task_goals.compute({} if goals is None else goals)
+        points, memory = targets.positions.copy(), self._split(None)[1]
+        wanted = self._lead(points, given)
+        begun = self.start.solve_motion(replace(targets, positions=wanted))
         base = self._body.base
         places = begun.translations[:, 0] if base == 0 else begun.positions[:, base]
-        points, memory = targets.positions.copy(), self._split(None)[1]
         parts = []
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             states = self._body.states_of(begun.rotations[part], places[part])
-            parts.append(self._refine(points[part], states, dt, memory, goals))
+            parts.append(self._refine(points[part], wanted[part], states, dt, memory, given))
             if progress:
                 progress(part.stop)
         out = Frames(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
@@ -170,7 +174,8 @@ class HybridIK:
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk, on the neutral pose."""
         self.start.warm_up()
-        self._refine(np.full((1, 6, 3), np.nan), self._body.rest_state()[None], 0.0, self._split(None)[1], None)
+        lost, rest = np.full((1, 6, 3), np.nan), self._body.rest_state()[None]
+        self._refine(lost, lost, rest, 0.0, self._split(None)[1], self._task_goals.default)
 
     def _split(self, previous: Solution | None) -> tuple[Solution | None, Array]:
         """The reconstruction's solution in a previous one, and a copy of what is remembered of the feet."""
@@ -181,38 +186,27 @@ class HybridIK:
             raise SixpointError("previous is of another figure or method; begin with previous=None")
         return replace(previous, state=previous.state[:-1]), memory.copy()
 
-    def _refine(self, points: Array, states: Array, dt: float, memory: Array, goals: Goals | None) -> Frames:
+    def _lead(self, points: Array, given: Array) -> Array:
+        """Where the six points should be (F, 6, 3) [m]: where a task wants them, or where they were seen."""
+        wanted = points.copy()
+        for point, task in self._led:
+            if np.isfinite(given[task, :3]).all():
+                wanted[:, point] = given[task, :3]
+        return wanted
+
+    def _refine(
+        self, points: Array, wanted: Array, states: Array, dt: float, memory: Array, given: Array
+    ) -> Frames:
         """Frames of prioritized IK from states (F, 2 J + 1, 4) of the reconstruction; updates ``memory``."""
-        feet = np.zeros((len(points), 2, 4))
-        feet[..., :3] = points[:, 4:]
-        if self.contacts:
-            hold_feet(points, float(dt), self.floor, memory, feet)
-        table = self._make_goals(points, states, feet, goals)
+        table = np.tile(self._base_goals, (len(points), 1, 1))
+        table[:, table.shape[1] - len(given) :] = given
+        world = (states, self._body.base, self._legs, float(dt), self.floor, self.contacts)
+        write_goals(points, wanted, *world, memory, table)
         out = self._engine.run(table, states, states[0].copy(), states, self._settings)
         residual = np.ascontiguousarray(out.residual[:, self._measured])
         missed = (residual > self._accepted).any(axis=1)
         status = np.where(out.status == Status.LOST, Status.LOST, np.where(missed, Status.UNREACHABLE, 0))
         return out._replace(status=status, residual=residual)
-
-    def _make_goals(self, points: Array, states: Array, feet: Array, goals: Goals | None) -> Array:
-        """Goals (F, T, 7) of all tasks."""
-        own = np.tile(self._base_goals, (len(points), 1, 1))
-        lost = ~(np.abs(points) < FAR).all(axis=-1, keepdims=True)
-        own[:, SEEN, :3] = np.where(lost, np.nan, points)
-        own[:, SEEN, 3:] = own[:, FOLLOWING, 3:] = own[:, STANDING, 3:] = rot.IDENTITY
-        turn = states[:, self._body.base]
-        shown = feet[..., 3:] != FREE
-        hips = states[:, len(self._body.tree), None, :3] + rot.mul_vec(turn[:, None], self._hips)
-        ways = feet[..., :3] - hips
-        share = self._reach / np.maximum(np.linalg.norm(ways, axis=-1), 1e-9)
-        within = hips + np.minimum(share, 1.0)[..., None] * ways
-        places = np.where(shown, within, own[:, 4:6, :3])
-        held = feet[..., 3:] == HELD
-        own[:, FOLLOWING, :3] = np.where(held, np.inf, places)
-        own[:, STANDING, :3] = np.where(held, places, np.inf)
-        own[:, TURNED, :3], own[:, TURNED, 3:] = 0.0, turn
-        given = self._task_goals.compute({} if goals is None else goals)
-        return np.concatenate([own, np.broadcast_to(given, (len(own), *given.shape))], axis=1)
 
     def _find_accepted(self) -> Array:
         """Residuals up to which a point or a task counts as met [m or rad]."""

@@ -65,8 +65,8 @@ class Engine:
             goals: Position and rotation of every task, NaN where it is off.
             starts: (S, 2 J + 1, 4) states to begin the first S frames from.
             state: (2 J + 1, 4) state to begin from otherwise.
-            attractors: (A, 2 J + 1, 4) states that the posture is drawn to in the first A frames, the last one
-                also in those that follow.
+            attractors: (A, 2 J + 1, 4) states that the posture is drawn to in the first A frames; the last
+                one also in those that follow.
             settings: See ``engine.packing.Settings``.
             scratch: Working memory to look at afterwards.
             explain: Write what unmet tasks gave way to.
