@@ -10,10 +10,11 @@ from hypothesis.extra.numpy import arrays
 
 import sixpoint as sp
 from independent import world_matrices
+from prioritized_bodies import Body, mass_centre, support
 from sixpoint.signals.contacts import find_contacts
 from sixpoint.solvers.hybrid.feet import EASING, FOLLOWING, HELD, ROWS, hold_feet
 from sixpoint.study.quality import compute_contact_drift
-from test_solvers import FIGURE, measured, points_of
+from test_solvers import FIGURE, points_of
 
 ROLES = FIGURE.roles
 REACH = FIGURE.targets(sp.make_sample("reach", FIGURE))
@@ -48,10 +49,9 @@ def step(rate: float, slide: float = 0.0) -> np.ndarray:
 def test_a_step_is_held_from_begin_to_end(rate):
     """At any frame rate a foot is held within 0.1 s of landing, and let go within 0.1 s of leaving."""
     places, why = follow(step(rate, slide=0.02), rate)
-    held = np.flatnonzero(why[:, 0] == HELD) / rate
-    assert 0.4 <= held[0] <= 0.5 and 1.0 <= held[-1] <= 1.1
-    assert np.array_equal(np.diff(held).round(9), np.full(len(held) - 1, 1 / rate).round(9))
-    assert np.ptp(places[why[:, 0] == HELD, 0][:, FLAT], axis=0).max() == 0.0
+    held, time = why[:, 0] == HELD, np.arange(len(why)) / rate
+    assert held[(time > 0.47) & (time < 1.0)].all() and not held[(time < 0.4) | (time > 1.1)].any()
+    assert np.ptp(places[held & (time > 0.47), 0][:, FLAT], axis=0).max() == 0.0
     np.testing.assert_array_equal(places[..., 1], step(rate)[..., 1])  # the height is followed
 
 
@@ -90,7 +90,7 @@ def test_a_foot_in_the_air_does_not_stand():
 
 
 def test_a_given_floor_tells_feet_that_dangle():
-    """Sitting with hanging feet: nothing is held where the floor is known; else the lowest height is floor."""
+    """Hanging feet are not held where the floor is known; else the lowest height is taken for it."""
     ankles = np.tile([[0.1, 0.35, 0.0], [-0.1, 0.35, 0.0]], (60, 1, 1))
     assert (follow(ankles, 120.0, floor=0.0)[1] == FOLLOWING).all()
     assert (follow(ankles, 120.0)[1][10:] == HELD).all()
@@ -160,7 +160,6 @@ def test_at_most_three_iterations_and_no_sliding(sample):
     positions, _ = world_matrices(sp.Motion.from_poses(motions, targets.rate))
     hips, ankles = positions[:, ROLES.hip], positions[:, ROLES.ankle]
     gap = np.linalg.norm((ankles - places)[..., FLAT], axis=-1)
-    leg = sum(np.linalg.norm(FIGURE.offset_between(*p)) for p in zip(*[(j, j) for j in ()], strict=True))
     root, middle, end = FIGURE.roles.limbs[2]
     leg = sum(np.linalg.norm(FIGURE.offset_between(a, b)) for a, b in ((root, middle), (middle, end)))
     stretched = np.linalg.norm(places - hips, axis=-1) > 0.999 * leg
@@ -176,28 +175,29 @@ def test_a_frame_needs_only_the_one_before():
 
 
 def test_the_start_may_be_any_solver_of_six_points():
-    """Standing feet hold from other reconstructions as well, PIK among them; the pelvis keeps their turn."""
-    for name in ("sik", "kma", "dls", "pik-flext"):
+    """Feet that stand are held from other reconstructions as well, PIK among them, and live as well."""
+    sliding = np.tile(REACH.positions[0], (60, 1, 1))
+    sliding[:, 4, 2] += np.linspace(0.0, 0.04, 60)
+    targets = sp.Targets(sliding, 60.0)
+    for name in ("sik", "pik-flext"):
         start = sp.make_solver(name, FIGURE)
-        solver = sp.HybridIK(FIGURE, start=start)
-        begun, solved = start.solve_motion(WALK), solver.solve_frames(WALK)
-        drift = compute_contact_drift(FIGURE, begun, solved.motion)
-        assert drift.mean() < 0.5 * compute_contact_drift(FIGURE, begun, begun).mean()
-        solution = None
+        solver, solution = sp.HybridIK(FIGURE, start=start), None
+        begun, solved = start.solve_motion(targets), solver.solve_motion(targets)
+        ways = [np.ptp(world_matrices(m)[0][5:, ROLES.ankle[0], 2]) for m in (begun, solved)]
+        assert ways[0] > 0.035 and ways[1] < 2e-3
         for frame in range(20):
-            solution = solver.solve(WALK.positions[frame], previous=solution, dt=1 / WALK.rate)
-            np.testing.assert_array_equal(solution.pose.rotations, solved.motion.rotations[frame])
+            solution = solver.solve(sliding[frame], previous=solution)
+            np.testing.assert_array_equal(solution.pose.rotations, solved.rotations[frame])
 
 
 # --- tasks -----------------------------------------------------------------------------------------
 
 
 def test_a_hand_keeps_its_contact():
-    """A palm on a rail stays there while the tracked wrist moves, the feet stand, and the rest hardly moves."""
-    begun = sp.SequentialIKPlus(FIGURE).solve_motion(REACH)
-    rail = world_matrices(begun)[0][60, ROLES.wrist[0]] + [0.03, 0.05, 0.04]
-    still = REACH.positions[60] + 0.01 * np.sin(np.arange(80))[:, None, None] * np.ones((6, 3))
-    still[:, 4:] = REACH.positions[60, 4:]
+    """A hand on a rail stays there while its tracker moves, the feet stand, and the rest hardly moves."""
+    rail = REACH.positions[20, 2] + [-0.05, 0.12, 0.1]
+    still = REACH.positions[20] + 0.01 * np.sin(np.arange(80))[:, None, None] * np.ones((6, 3))
+    still[:, 4:] = REACH.positions[20, 4:]
     targets = sp.Targets(still, 60.0)
     task = sp.PositionTask("l_wrist", level=2, goal=rail)
     solved = sp.HybridIK(FIGURE, [task]).solve_frames(targets)
@@ -228,21 +228,21 @@ def test_an_obstacle_holds():
 
 def test_balance_holds():
     """Points of a lean that would fall are met as far as the centre of mass stays over the feet."""
-    points = points_of(FIGURE)
-    points[:4, 2] += np.linspace(0.0, 0.25, 40)[:, None, None][-1]
     lean = np.tile(points_of(FIGURE), (40, 1, 1))
     lean[:, :4, 2] += np.linspace(0.0, 0.25, 40)[:, None]
+    lean[:, :4, 1] -= 0.06
     targets = sp.Targets(lean, 60.0)
     task = sp.BalanceTask(level=2)
     balanced = sp.HybridIK(FIGURE, [task], limits=False).solve_frames(targets)
     plain = sp.HybridIK(FIGURE, limits=False).solve_frames(targets)
-    meter = sp.PrioritizedIK(FIGURE, [task], limits=False, least_iterations=0, iterations=0)
-    off = [
-        max(meter.solve({}, start=sp.Pose(m.skeleton, r, t, m.moving)).residual[0] for r, t in frames)
-        for m in (plain.motion, balanced.motion)
-        for frames in [list(zip(m.rotations, m.translations, strict=True))]
-    ]
-    assert off[0] > 0.05 and off[1] < 2e-3
+    body = Body("figure", FIGURE, FIGURE.dofs)
+    off = []
+    for solved in (plain, balanced):
+        worlds = world_matrices(solved.motion)
+        centres = mass_centre(body, *worlds)[:, [0, 2]]
+        hulls = [support(body, *world).equations for world in zip(*worlds, strict=True)]
+        off.append(max((e[:, :2] @ c + e[:, 2]).max() for e, c in zip(hulls, centres, strict=True)))
+    assert off[0] > 0.01 and off[1] < -0.01  # the margin asked for is 2 cm
     ankles = world_matrices(balanced.motion)[0][5:, ROLES.ankle]
     assert np.ptp(ankles[..., FLAT], axis=0).max() < 2e-3
 
@@ -250,13 +250,13 @@ def test_balance_holds():
 def test_ankles_stay_above_the_floor():
     """With a floor no foot goes through it, whatever the trackers say."""
     sunk = WALK.positions.copy()
-    sunk[:, 4:, 1] -= 0.05
+    sunk[..., 1] -= 0.06
     sole = FIGURE.rest_positions[ROLES.ankle[0], 1] - FIGURE.rest_positions[:, 1].min()
     for floor, lowest in ((None, -np.inf), (0.0, sole - 2e-3)):
         motion = sp.HybridIK(FIGURE, floor=floor).solve_motion(sp.Targets(sunk, WALK.rate))
         ankles = world_matrices(motion)[0][:, ROLES.ankle, 1]
         assert ankles.min() > lowest
-        assert floor is not None or ankles.min() < sole - 0.04
+        assert floor is not None or ankles.min() < sole - 0.02
 
 
 def test_goals_may_be_given_frame_by_frame():
@@ -281,10 +281,9 @@ def test_wrong_constructions_say_what_would_work():
         sp.HybridIK(FIGURE, floor=np.nan)
     with pytest.raises(sp.SixpointError, match="another figure"):
         sp.HybridIK(FIGURE, start=sp.SequentialIK(sp.Figure.from_stature(1.6)))
+    stranger = sp.SequentialIKPlus(FIGURE).solve(points_of(FIGURE))
     with pytest.raises(sp.SixpointError, match="previous"):
-        sp.HybridIK(FIGURE).solve(
-            points_of(FIGURE), previous=sp.SequentialIKPlus(FIGURE).solve(points_of(FIGURE))
-        )
+        sp.HybridIK(FIGURE).solve(points_of(FIGURE), previous=stranger)
 
 
 # --- recordings ------------------------------------------------------------------------------------
@@ -297,9 +296,10 @@ def test_drift_is_the_way_from_where_a_contact_began():
     contacts = find_contacts(truth.positions[:, ROLES.ankle], truth.rate)
     expected = []
     for k in range(2):
+        first = 0
         for f in range(len(truth)):
             if contacts[f, k]:
-                first = f if f == 0 or not contacts[f - 1, k] else first
+                first = first if f > 0 and contacts[f - 1, k] else f
                 way = result.positions[f, ROLES.ankle[k]] - result.positions[first, ROLES.ankle[k]]
                 expected.append(np.hypot(way[0], way[2]))
     np.testing.assert_allclose(compute_contact_drift(FIGURE, truth, result), expected, atol=1e-12)

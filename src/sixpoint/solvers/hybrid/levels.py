@@ -23,13 +23,14 @@ FOLLOWED = dict(zip(EFFECTORS, (PELVIS, HEAD, ARMS, ARMS, LEGS, LEGS), strict=Tr
 """Level of each of the six points, in their order."""
 
 ANYTHING = 1e6  # m, a tolerance that is always met
+NOTHING = 1e-9  # weight whose rows are too short to move anything
 
 
 def build_tasks(body: Articulation, floor: float | None) -> list[Task]:
     """The hybrid's own tasks, in the order of ``goals``; the first six have the residuals of the six points.
 
     An ankle stands or follows, and a task may want a point elsewhere. So its distance to where it was seen is
-    measured apart: by rows at the end of all, for which nothing is left to move.
+    measured apart, by rows that move nothing.
 
     Args:
         body: What is posed.
@@ -37,19 +38,28 @@ def build_tasks(body: Articulation, floor: float | None) -> list[Task]:
     """
     ankles = ("l_ankle", "r_ankle")
     tasks: list[Task] = [
-        *(PositionTask(at, level=MEASURED, tolerance=ANYTHING, name=f"{at} seen") for at in FOLLOWED),
+        *(_measure(at) for at in FOLLOWED),
         *(_follow(at, level) for at, level in FOLLOWED.items()),
         *(FlextTask(at, level=FEET, drag=True, drag_level=FEET + 1, name=f"{at} stands") for at in ankles),
         OrientationTask("pelvis", level=TURN, name="pelvis turn"),
     ]
     if floor is not None:
         goal = (0.0, floor, 0.0, 0.0, 0.0, 0.0, 1.0)
-        soles = support_of(body, BalanceTask())
-        sole = min(body.rest_positions[joint, 1] + offset[1] for joint, offset in soles)
-        for at in ankles:
-            depth = max(float(body.rest_positions[body.place(at)[0], 1] - sole), 0.0)
-            tasks.append(PlaneTask(at, level=FEET, margin=depth, goal=goal, name=f"{at} floor"))
+        depths = zip(ankles, sole_depths(body), strict=True)
+        tasks += [PlaneTask(at, level=FEET, margin=d, goal=goal, name=f"{at} floor") for at, d in depths]
     return tasks
+
+
+def sole_depths(body: Articulation) -> list[float]:
+    """How far the lowest point of the rig's feet is below either ankle in the neutral pose [m]."""
+    points = support_of(body, BalanceTask())
+    sole = min(body.rest_positions[joint, 1] + offset[1] for joint, offset in points)
+    ankles = [body.place(at)[0] for at in ("l_ankle", "r_ankle")]
+    return [max(float(body.rest_positions[ankle, 1] - sole), 0.0) for ankle in ankles]
+
+
+def _measure(at: str) -> Task:
+    return PositionTask(at, level=MEASURED, weight=NOTHING, tolerance=ANYTHING, name=f"{at} seen")
 
 
 def _follow(at: str, level: int) -> Task:

@@ -19,7 +19,7 @@ from sixpoint.errors import SixpointError
 from sixpoint.solvers.base import MotionSolution, Progress, Solution, Solver, Status
 from sixpoint.solvers.hybrid.feet import ROWS
 from sixpoint.solvers.hybrid.goals import write_goals
-from sixpoint.solvers.hybrid.levels import build_tasks, find_led
+from sixpoint.solvers.hybrid.levels import build_tasks, find_led, sole_depths
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.engine.packing import ACCEPT, TASK, pack_settings
 from sixpoint.solvers.prioritized.goals import Goals, GoalTable
@@ -48,7 +48,7 @@ class HybridIK:
     Args:
         figure: What to pose.
         tasks: More constraints, each at a level of its own; those at 2 to 9 come after the feet and before
-            the pelvis.
+            the pelvis. One that moves a tracked point (a hand to its contact) moves it for ``start`` as well.
         start: The solver of the reconstruction, for the same figure; ``SequentialIKPlus`` by default.
         contacts: Hold feet that stand.
         floor: Height of the floor [m]: no ankle comes nearer to it than the rig's sole allows, and a foot
@@ -93,6 +93,7 @@ class HybridIK:
         self._base_goals = GoalTable(every).default
         self._task_goals = GoalTable(tasks)
         self._led = find_led(tasks)
+        self._lowest = None if floor is None else floor + np.array(sole_depths(self._body))
         self._measured = [*range(6), *range(len(own), len(every))]
         self._accepted = self._find_accepted()
         self.names: tuple[str, ...] = (*EFFECTORS, *(task.label for task in tasks))
@@ -187,8 +188,10 @@ class HybridIK:
         return replace(previous, state=previous.state[:-1]), memory.copy()
 
     def _lead(self, points: Array, given: Array) -> Array:
-        """Where the six points should be (F, 6, 3) [m]: where a task wants them, or where they were seen."""
+        """Where the six points should be (F, 6, 3) [m]: as seen, but above the floor, and where tasks say."""
         wanted = points.copy()
+        if self._lowest is not None:
+            wanted[:, 4:, 1] = np.maximum(wanted[:, 4:, 1], self._lowest)
         for point, task in self._led:
             if np.isfinite(given[task, :3]).all():
                 wanted[:, point] = given[task, :3]
