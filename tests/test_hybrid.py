@@ -190,6 +190,20 @@ def test_the_start_may_be_any_solver_of_six_points():
             np.testing.assert_array_equal(solution.pose.rotations, solved.rotations[frame])
 
 
+def test_an_unknown_frame_time_is_forgotten():
+    """After a frame time that is not a number contacts begin and end as before."""
+    ankles, solver = step(120.0), sp.HybridIK(FIGURE)
+    points = np.tile(points_of(FIGURE), (len(ankles), 1, 1))
+    points[:, 4:] = ankles
+    solution, expected = None, None
+    for frame, six in enumerate(points):
+        solution = solver.solve(six, previous=solution, dt=np.nan if frame == 5 else 1 / 120)
+        expected = solver.solve(six, previous=expected, dt=1 / 120)
+        if frame > 40:
+            np.testing.assert_array_equal(solution.state[-1][[3, 9], 3], expected.state[-1][[3, 9], 3])
+    assert np.isfinite(solution.state[-1]).all()
+
+
 # --- tasks -----------------------------------------------------------------------------------------
 
 

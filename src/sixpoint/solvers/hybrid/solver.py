@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 STATUSES = tuple(Status)
 CHUNK = 512  # frames between two reports of progress
 BACK = 0.5  # share of the way back to the reconstruction that one iteration asks for
+LONG = 1e3  # s, longer pauses count as this
 STRETCH = 0.9995  # a foot is held within this share of its leg's length
 
 
@@ -53,7 +54,7 @@ class HybridIK:
         contacts: Hold feet that stand.
         floor: Height of the floor [m]: no ankle comes nearer to it than the rig's sole allows, and a foot
             whose ankle is 12 cm above it does not stand. Without it the floor is where each ankle was lowest.
-        limits: Keep every joint within its limits.
+        limits: Keep every joint within its limits; a solver given as ``start`` has its own say.
         iterations: Most iterations of a frame.
         dofs: What prioritized IK may move; a figure has its own. ``figure.full_dofs()`` adds forearms, wrists
             and ankles, which tasks on hands and feet need.
@@ -203,7 +204,8 @@ class HybridIK:
         """Frames of prioritized IK from states (F, 2 J + 1, 4) of the reconstruction; updates ``memory``."""
         table = np.tile(self._base_goals, (len(points), 1, 1))
         table[:, table.shape[1] - len(given) :] = given
-        world = (states, self._body.base, self._legs, float(dt), self.floor, self.contacts)
+        time = min(float(dt), LONG) if dt > 0 else 0.0
+        world = (states, self._body.base, self._legs, time, self.floor, self.contacts)
         write_goals(points, wanted, *world, memory, table)
         out = self._engine.run(table, states, states[0].copy(), states, self._settings)
         residual = np.ascontiguousarray(out.residual[:, self._measured])
