@@ -137,14 +137,13 @@ def test_no_ankles_break_it(ankles, dt):
 
 @pytest.mark.parametrize("sample", sorted(sp.SAMPLES))
 def test_without_contacts_it_is_the_reconstruction(sample):
-    """With nothing to hold and every point met no iteration is needed, and the pose is the start's."""
+    """With nothing to hold no iteration is needed, and the pose is the start's, whatever that misses."""
     targets = FIGURE.targets(sp.make_sample(sample, FIGURE))
     begun = sp.SequentialIKPlus(FIGURE).solve_frames(targets)
     solved = sp.HybridIK(FIGURE, contacts=False).solve_frames(targets)
-    met = (begun.residual < 9e-4).all(axis=1)
-    assert met.mean() > 0.5
     gap = np.abs(world_matrices(solved.motion)[0] - world_matrices(begun.motion)[0])
-    np.testing.assert_allclose(gap[met], 0.0, atol=1e-9)
+    np.testing.assert_allclose(gap, 0.0, atol=1e-9)
+    np.testing.assert_array_equal(solved.status, begun.status)
 
 
 @pytest.mark.parametrize("sample", sorted(sp.SAMPLES))

@@ -25,20 +25,45 @@ def write_point(goals, row, place):
     goals[row, 3], goals[row, 4], goals[row, 5], goals[row, 6] = 0.0, 0.0, 0.0, 1.0
 
 
+@helper
+def end_of(rotations, rig, base, pelvis, ends, k):
+    """Where an end of the reconstruction is, given its rig's local rotations and the pelvis' place."""
+    joint, place = int(ends[k, 3]), vec.load(ends, k)
+    while joint >= 0:
+        place = qt.mul_vec(qt.load(rotations, joint), place)
+        if joint > base:
+            place = vec.add(vec.load(rig, joint), place)
+        joint = int(rig[joint, 3])
+    return vec.add(pelvis, place)
+
+
 @entry
-def write_goals(points, wanted, states, base, legs, dt, floor, contacts, memory, goals):
+def write_goals(points, wanted, rotations, states, rig, ends, legs, base, dt, floor, contacts, memory, goals):
     """Write the goals (F, T, 7) of the hybrid's own tasks.
 
-    ``points`` (F, 6, 3) are where the six points were seen and ``wanted`` where they should be [m];
-    ``states`` (F, 2 J + 1, 4) are the reconstruction's, with the pelvis in row ``base``; ``legs`` (2, 4) hold
-    the hip from the pelvis and how far the leg reaches [m]. ``memory`` becomes that after the last frame.
+    ``memory`` becomes that after the last frame.
+
+    Args:
+        points: (F, 6, 3) where the six points were seen [m].
+        wanted: (F, 6, 3) where they should be [m]; of these feet are held.
+        rotations: (F, J, 4) local rotations of the reconstruction, whose ends the body follows.
+        states: (F, 2 J + 1, 4) the same as states of prioritized IK.
+        rig: (J, 4) offset of each joint of the rig [m], and its parent.
+        ends: (6, 4) place of each end in its joint's frame [m], and the joint.
+        legs: (2, 4) the hips from the pelvis, and how far the legs reach [m].
+        base: The pelvis.
+        dt: Time between frames [s].
+        floor: Its height [m]; infinite where it is to be learnt.
+        contacts: Whether to hold feet.
+        memory: See ``feet``.
+        goals: What is written.
     """
     for f in range(points.shape[0]):
-        for k in range(6):
-            seen, known = is_seen(points[f], k), is_seen(wanted[f], k)
-            write_point(goals[f], SEEN + k, vec.load(points[f], k) if seen else (LOST, LOST, LOST))
-            write_point(goals[f], FOLLOWS + k, vec.load(wanted[f], k) if known else (LOST, LOST, LOST))
         pelvis, turn = vec.load(states[f], (states.shape[1] - 1) // 2), qt.load(states[f], base)
+        for k in range(6):
+            seen = is_seen(points[f], k)
+            write_point(goals[f], SEEN + k, vec.load(points[f], k) if seen else (LOST, LOST, LOST))
+            write_point(goals[f], FOLLOWS + k, end_of(rotations[f], rig, base, pelvis, ends, k))
         write_point(goals[f], TURN, (0.0, 0.0, 0.0))
         for i in range(4):
             goals[f, TURN, 3 + i] = turn[i]

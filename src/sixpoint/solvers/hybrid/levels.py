@@ -63,7 +63,7 @@ def _measure(at: str) -> Task:
 
 
 def _follow(at: str, level: int) -> Task:
-    """Pelvis and head by plain positions, limbs by FLEXT; out of reach the reconstruction stays as it is."""
+    """Pelvis and head by plain positions, limbs by FLEXT; the reconstruction has them there already."""
     if at in ("pelvis", "head"):
         return PositionTask(at, level=level, name=f"{at} follows")
     return FlextTask(at, level=level, drag=False, name=f"{at} follows")

@@ -98,9 +98,14 @@ class HybridIK:
         self._measured = [*range(6), *range(len(own), len(every))]
         self._accepted = self._find_accepted()
         self.names: tuple[str, ...] = (*EFFECTORS, *(task.label for task in tasks))
-        legs, between = figure.roles.limbs[2:], figure.offset_between
+        self._rig = np.column_stack([figure.skeleton.offsets, figure.skeleton.parents]).astype(float)
+        roles = figure.roles
+        joints = (roles.pelvis, roles.head, *roles.wrist, *roles.ankle)
+        self._ends = np.array([[0.0, 0.0, 0.0, joint] for joint in joints])
+        self._ends[1, :3] = roles.head_offset
+        legs, between = roles.limbs[2:], figure.offset_between
         lengths = [np.linalg.norm(between(a, b)) + np.linalg.norm(between(b, c)) for a, b, c in legs]
-        hips = [between(figure.roles.pelvis, hip) for hip, _, _ in legs]
+        hips = [between(roles.pelvis, hip) for hip, _, _ in legs]
         self._legs = np.column_stack([hips, STRETCH * np.array(lengths)])
 
     def solve(
@@ -132,7 +137,8 @@ class HybridIK:
         given = self._task_goals.compute({} if goals is None else goals)
         wanted = self._lead(frame, given)
         begun = self.start.solve(wanted[0], before, dt)
-        out = self._refine(frame, wanted, self._body.state_of(begun.pose)[None], dt, memory, given)
+        states = self._body.state_of(begun.pose)[None]
+        out = self._refine(frame, wanted, begun.pose.rotations[None], states, dt, memory, given)
         moving, translations = self._body.place_base(out.rotations, out.positions)
         pose = Pose(self._body.rig, out.rotations[0], translations[0], moving)
         state = (*begun.state, memory)
@@ -159,8 +165,9 @@ class HybridIK:
         step = CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
-            states = self._body.states_of(begun.rotations[part], places[part])
-            parts.append(self._refine(points[part], wanted[part], states, dt, memory, given))
+            turned = begun.rotations[part]
+            states = self._body.states_of(turned, places[part])
+            parts.append(self._refine(points[part], wanted[part], turned, states, dt, memory, given))
             if progress:
                 progress(part.stop)
         out = Frames(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
@@ -177,7 +184,8 @@ class HybridIK:
         """Compile the kernels, or load them from disk, on the neutral pose."""
         self.start.warm_up()
         lost, rest = np.full((1, 6, 3), np.nan), self._body.rest_state()[None]
-        self._refine(lost, lost, rest, 0.0, self._split(None)[1], self._task_goals.default)
+        turned = self.figure.neutral_pose.rotations[None]
+        self._refine(lost, lost, turned, rest, 0.0, self._split(None)[1], self._task_goals.default)
 
     def _split(self, previous: Solution | None) -> tuple[Solution | None, Array]:
         """The reconstruction's solution in a previous one, and a copy of what is remembered of the feet."""
@@ -199,14 +207,25 @@ class HybridIK:
         return wanted
 
     def _refine(
-        self, points: Array, wanted: Array, states: Array, dt: float, memory: Array, given: Array
+        self,
+        points: Array,
+        wanted: Array,
+        turned: Array,
+        states: Array,
+        dt: float,
+        memory: Array,
+        given: Array,
     ) -> Frames:
-        """Frames of prioritized IK from states (F, 2 J + 1, 4) of the reconstruction; updates ``memory``."""
+        """Frames of prioritized IK from those of the reconstruction; updates ``memory``.
+
+        ``turned`` are its local rotations (F, J, 4), ``states`` (F, 2 J + 1, 4) the same for prioritized IK.
+        """
         table = np.tile(self._base_goals, (len(points), 1, 1))
         table[:, table.shape[1] - len(given) :] = given
         time = min(float(dt), LONG) if dt > 0 else 0.0
-        world = (states, self._body.base, self._legs, time, self.floor, self.contacts)
-        write_goals(points, wanted, *world, memory, table)
+        body = (self._rig, self._ends, self._legs, self._body.base)
+        begun = (turned.copy(), states)  # read-only arrays are another type to Numba: one more compilation
+        write_goals(points, wanted, *begun, *body, time, self.floor, self.contacts, memory, table)
         out = self._engine.run(table, states, states[0].copy(), states, self._settings)
         residual = np.ascontiguousarray(out.residual[:, self._measured])
         missed = (residual > self._accepted).any(axis=1)
