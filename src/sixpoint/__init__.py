@@ -21,6 +21,7 @@ from sixpoint.formats import load, load_targets, save, save_targets
 from sixpoint.samples import SAMPLES, make_sample
 from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
 from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
+from sixpoint.solvers.hybrid.solver import HybridIK
 from sixpoint.solvers.jacobian.solver import JacobianIK
 from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
@@ -75,6 +76,7 @@ __all__ = [
     "Habits",
     "HalfSpace",
     "Hinges",
+    "HybridIK",
     "JacobianIK",
     "KulpaMultonArnaldi",
     "Limits",

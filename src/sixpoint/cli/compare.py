@@ -40,7 +40,7 @@ def compare(
         str | None,
         Parameter(
             help="`all`, or names with commas: sik, sik+, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, sdls, "
-            "pik, pik-flext; `module:Class` for your own."
+            "pik, pik-flext, hybrid; `module:Class` for your own."
         ),
     ] = None,
     out: Annotated[Path, Parameter(name=("--out", "-o"), help="Folder of the report.")] = Path("report"),

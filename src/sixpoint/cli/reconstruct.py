@@ -36,14 +36,14 @@ def reconstruct(
     method: Annotated[
         str,
         Parameter(
-            help="How to solve: sik+ (world Y must be up), sik, tgbsik, kma, ccd, jt, pinv, dls, dls-svd, "
-            "sdls, pik or pik-flext; `module:Class` for your own."
+            help="How to solve: sik+ or sik-prior (world Y must be up), hybrid, sik, tgbsik, kma, ccd, jt, "
+            "pinv, dls, dls-svd, sdls, pik or pik-flext; `module:Class` for your own."
         ),
     ] = "sik+",
     weights: Annotated[
         str | None,
         Parameter(
-            help="Of sik, and of all but sik+, pik and pik-flext: influence of wrists, ankles and the last "
+            help="Of sik, tgbsik, kma, ccd and the Jacobian methods: influence of wrists, ankles and the last "
             "frame on the turn of the pelvis: 1,1,0 for boxing and kicks; 0.1,0.1,1 is steadier."
         ),
     ] = None,

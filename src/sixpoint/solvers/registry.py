@@ -15,6 +15,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.base import Solver
 from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
+from sixpoint.solvers.hybrid.solver import HybridIK
 from sixpoint.solvers.jacobian.solver import JacobianIK
 from sixpoint.solvers.kma.solver import KulpaMultonArnaldi
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
@@ -37,6 +38,7 @@ SOLVERS: dict[str, Callable[..., Solver]] = {
     "sdls": partial(JacobianIK, step="sdls"),
     "pik": partial(PrioritizedIK.from_targets, flext=False),
     "pik-flext": PrioritizedIK.from_targets,
+    "hybrid": HybridIK,
 }
 """Name -> what makes the solver of a figure."""
 

@@ -124,6 +124,28 @@ def compute_residuals(figure: Figure, result: Motion, targets: Targets) -> Array
     return np.asarray(worst[known.any(axis=1)])
 
 
+def compute_contact_drift(figure: Figure, truth: Motion, result: Motion) -> Array:
+    """How far ankles are from where their contact began, horizontally, in each frame of contact (n,) [m].
+
+    Contacts are those of the true ankles (``find_contacts``), the left ones before the right ones; where a
+    contact began is where the result's ankle was in its first frame. The height does not count: an ankle
+    rises while the foot rolls over its ball.
+
+    Raises:
+        SkeletonError: The motions do not have as many frames.
+    """
+    if len(truth) != len(result):
+        raise SkeletonError(f"truth has {len(truth)} frames, the result {len(result)}")
+    ankles = list(figure.roles.ankle)
+    contacts = find_contacts(truth.positions[:, ankles], truth.rate).T
+    places = np.swapaxes(result.positions[:, ankles], 0, 1)[..., [0, 2]]
+    frame = np.arange(len(truth))
+    begun = contacts & ~np.pad(contacts, ((0, 0), (1, 0)))[:, :-1]
+    first = np.maximum.accumulate(np.where(begun, frame, 0), axis=1)
+    ways = places - np.take_along_axis(places, first[..., None], axis=1)
+    return np.asarray(np.linalg.norm(ways, axis=-1)[contacts])
+
+
 def _skate(figure: Figure, motion: Motion, contacts: NDArray[np.bool_]) -> float:
     """Mean horizontal way of the ankles per step between two frames of contact (F, 2) [m]."""
     ankles = motion.positions[:, figure.roles.ankle]

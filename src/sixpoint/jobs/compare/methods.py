@@ -30,6 +30,7 @@ PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
         "levels pelvis, ankles, wrists, head; stops at 1 cm, or by its own rule",
     ),
     "pik-flext": ({"tolerance": 0.01}, "as pik, limbs by FLEXT in its secant form"),
+    "hybrid": ({}, "sik+, then feet that stand held by at most three iterations of pik-flext"),
 }
 """Method -> options that differ from the solver's own, and the preset in words."""
 

@@ -54,7 +54,7 @@ class Engine:
         goals: Array,
         starts: Array,
         state: Array,
-        attractor: Array,
+        attractors: Array,
         settings: Array,
         scratch: tuple[Array, ...] | None = None,
         explain: bool = False,
@@ -65,7 +65,8 @@ class Engine:
             goals: Position and rotation of every task, NaN where it is off.
             starts: (S, 2 J + 1, 4) states to begin the first S frames from.
             state: (2 J + 1, 4) state to begin from otherwise.
-            attractor: State that the posture is drawn to.
+            attractors: (A, 2 J + 1, 4) states that the posture is drawn to in the first A frames; the last
+                one also in those that follow.
             settings: See ``engine.packing.Settings``.
             scratch: Working memory to look at afterwards.
             explain: Write what unmet tasks gave way to.
@@ -83,7 +84,7 @@ class Engine:
         if not compiled and not is_cached("solve_prioritized"):
             log.warning("compiling the prioritized engine, once (about half a minute)")
         scratch = scratch or self.make_scratch()
-        arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractor, *scratch, *out]
+        arguments: list[Any] = [*self._arrays, settings, goals, starts, state, attractors, *scratch, *out]
         solve_prioritized(*arguments)
         return out
 

@@ -87,7 +87,7 @@ class PrioritizedIK:
         self._start = self.body.rest_state()
         self._fixed = ~self.body.moving_rows()
         self._no_starts = np.empty((0, *self._start.shape))
-        self._attractor = attractor_state(self.body, self.posture)
+        self._attractor = attractor_state(self.body, self.posture)[None]
         self._adapted: dict[float, Array] = {}
         self._starter: SequentialIK | None = None
         self._restart = False
@@ -189,7 +189,7 @@ class PrioritizedIK:
         if previous is None and start is None:
             place_base(self.body, self.tasks, frame, state)
         settings = self._cold_settings if previous is None and start is None else self._settings_at(dt)
-        attractor = self._attractor if posture is None else self.body.state_of(posture)
+        attractor = self._attractor if posture is None else self.body.state_of(posture)[None]
         out = self._engine.run(frame[None], self._no_starts, state, attractor, settings, explain=True)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)

@@ -281,7 +281,7 @@ def solve_prioritized(
     goals,
     starts,
     state,
-    attractor,
+    attractors,
     best,
     vectors,
     rows,
@@ -296,8 +296,9 @@ def solve_prioritized(
 ):
     """Solve every frame of goals (F, T, 7).
 
-    The state goes from frame to frame unless ``starts`` holds one for the frame. Written are the rig's local
-    rotations, the base's position, status, residuals, iterations, and which task gave way to which.
+    The state goes from frame to frame unless ``starts`` holds one for the frame; so do the states that the
+    posture is drawn to, where ``attractors`` has no more. Written are the rig's local rotations, the base's
+    position, status, residuals, iterations, and which task gave way to which.
     """
     m = unpack_model(table, integers)
     joints, columns = len(m.parent), len(m.hinges)
@@ -308,6 +309,7 @@ def solve_prioritized(
             for i in range(len(state)):
                 for k in range(4):
                     state[i, k] = starts[f, i, k]
+        attractor = attractors[min(f, len(attractors) - 1)]
         iterations[f] = solve_frame(m, w, balls, index, values, goals[f], state, attractor, best, settings)
         status[f] = status_of(w, index, values, goals[f], residual[f])
         if f < len(yielded) and status[f] != CONVERGED:
