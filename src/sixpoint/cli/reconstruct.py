@@ -37,7 +37,7 @@ def reconstruct(
         str,
         Parameter(
             help="How to solve: sik+ or sik-prior (world Y must be up), hybrid, sik, tgbsik, kma, ccd, jt, "
-            "pinv, dls, dls-svd, sdls, pik or pik-flext; `module:Class` for your own."
+            "pinv, dls, dls-svd, sdls, pik, pik-flext; `module:Class` for your own."
         ),
     ] = "sik+",
     weights: Annotated[

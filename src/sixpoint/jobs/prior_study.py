@@ -233,11 +233,12 @@ hands and feet optional). In each a linear map and a network of two layers ({wid
 features and added, give the start of pelvis, spine and head; linear maps give the directions of elbows and
 knees. `sik-prior` then closes the trunk on the head and the limbs on their points.
 
-**Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames, seed
-{base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the hips by
-{100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard deviations). The loss is
-what is reported, squared: position error over {base.position} and orientation error over
-{base.orientation} rad (with rotations over {turned.position} and {turned.orientation}), through closing and forward kinematics.
+**Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames,
+seed {base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the hips by
+{100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard deviations). The loss
+is what is reported, squared: position error over {base.position} and orientation error over
+{base.orientation} rad (with rotations over {turned.position} and {turned.orientation}), through closing and
+forward kinematics.
 
 **Errors**, limits off: position over the height and orientation [rad], RMS over frames, mean over clips. The
 last two columns have exact rotations of all six points. Only people that the prior was not fitted on say what

@@ -58,7 +58,7 @@ def close_on_head(model, s, goal, first, turned, pinned, local, world, segs):
 
 @helper
 def start_trunk(model, s, filled, turned, local, memory, world, segs):
-    """Pelvis and spine before the spine closes on the head; returns the pelvis' X and the chord's direction."""
+    """Pelvis and spine before the spine closes on the head; returns the pelvis' X and the chord's unit."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
     qt.store(local, 0, qt.from_axes(x, y, vec.cross(x, y)))

@@ -10,7 +10,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.sequential_plus.measured import is_measured
 from sixpoint.solvers.sequential_plus.pelvis import UP
-from sixpoint.solvers.sequential_prior.packing import END, LIMB, POINTS, TURNED
+from sixpoint.solvers.sequential_prior.packing import END, LIMB, MASKS, POINTS, TURNED
 
 SHORT = 1e-6  # m
 
@@ -68,6 +68,36 @@ def see_rotations(turned, frame, features):
         else:
             for k in range(at, at + 6):
                 features[k] = 0.0
+
+
+@helper
+def reflect(features, source, mirrored, target):
+    """A vector seen in the mirror."""
+    mirrored[target] = -features[source]
+    mirrored[target + 1] = features[source + 1]
+    mirrored[target + 2] = features[source + 2]
+
+
+@helper
+def mirror(features, with_rotations, mirrored):
+    """All features with left and right exchanged."""
+    reflect(features, 0, mirrored, 0)
+    for i in range(3, 15, 6):
+        reflect(features, i, mirrored, i + 3)
+        reflect(features, i + 3, mirrored, i)
+    reflect(features, 15, mirrored, 15)
+    put(mirrored, 18, (features[18], -features[19], -features[20]))  # what is told points to the left
+    reflect(features, 21, mirrored, 21)
+    for i in range(24, POINTS):
+        mirrored[i] = features[i]
+    if not with_rotations:
+        return
+    masks = POINTS + TURNED
+    for i in range(MASKS):
+        other = i if i == 0 else i + 1 if i % 2 == 1 else i - 1
+        reflect(features, POINTS + 6 * i, mirrored, POINTS + 6 * other)
+        reflect(features, POINTS + 6 * i + 3, mirrored, POINTS + 6 * other + 3)
+        mirrored[masks + other] = features[masks + i]
 
 
 @helper

@@ -146,7 +146,7 @@ def ask_prior(model, s, facts, places, turns, turned, filled, chord, memory, tho
     if held:
         see_rotations(turned, frame, thought.features)
     trust *= fade(strangeness(thought.features, network.mean, network.spread, POINTS), USUAL, STRANGE)
-    think(network, thought.features, thought.hidden1, thought.hidden2, thought.out)
+    think(network, thought)
     lean_on(model, s, facts, thought, held, frame, trust, local)
     return trust
 

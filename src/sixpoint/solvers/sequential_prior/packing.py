@@ -107,16 +107,22 @@ class Thought(NamedTuple):
 
     Attributes:
         features: (69,) at most.
+        mirrored: (69,) the same with left and right exchanged.
+        normal: (69,) either, normalised.
         hidden1: (H,).
         hidden2: (H,).
         out: (21,).
+        other: (21,) the same of the mirrored features.
         course: (7, 4) rotation of the trunk at each station against the pelvis.
     """
 
     features: np.ndarray
+    mirrored: np.ndarray
+    normal: np.ndarray
     hidden1: np.ndarray
     hidden2: np.ndarray
     out: np.ndarray
+    other: np.ndarray
     course: np.ndarray
 
 
@@ -125,12 +131,23 @@ ROOM = POINTS + TURNED + MASKS
 
 def thought_size(hidden):
     """Numbers of working memory for layers of ``hidden`` at most; the course is apart."""
-    return ROOM + OUTPUTS + 2 * hidden
+    return 3 * ROOM + 2 * OUTPUTS + 2 * hidden
 
 
 @helper
 def unpack_thought(numbers, course):
     """Working memory as slices."""
-    hidden = (numbers.shape[0] - ROOM - OUTPUTS) // 2
-    a, b = ROOM + hidden, ROOM + 2 * hidden
-    return Thought(numbers[:ROOM], numbers[ROOM:a], numbers[a:b], numbers[b:], course)
+    hidden = (numbers.shape[0] - 3 * ROOM - 2 * OUTPUTS) // 2
+    a = 3 * ROOM
+    b, c = a + hidden, a + 2 * hidden
+    d = c + OUTPUTS
+    return Thought(
+        numbers[:ROOM],
+        numbers[ROOM : 2 * ROOM],
+        numbers[2 * ROOM : a],
+        numbers[a:b],
+        numbers[b:c],
+        numbers[c:d],
+        numbers[d:],
+        course,
+    )

@@ -41,8 +41,8 @@ class SequentialIKPrior(SequentialIKPlus):
     """SIK+ whose trunk, elbows and knees begin where a small fitted prior says.
 
     The prior is a linear map and a network of two small layers, ten thousand numbers in all. What it says
-    is a start: the trunk then closes on the head and the limbs on their points, exactly and within the limits, as
-    in SIK+. Where the input is unlike what it was fitted on, SIK+'s own start takes over smoothly.
+    is a start: the trunk then closes on the head and the limbs on their points, exactly and within the
+    limits, as in SIK+. Where the input is unlike what it was fitted on, SIK+'s own start takes over smoothly.
 
     Args:
         figure: What to pose.
