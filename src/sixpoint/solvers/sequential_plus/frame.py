@@ -24,7 +24,7 @@ CHEST = 0.75  # height of the chest's point between pelvis and head
 TOLD = 0.02  # m, lines that tell less than this tell nothing
 RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 TWIST = 0.8  # rad, largest twist of the thorax
-DAMPING = 1e-6  # m^2, of the trunk's Newton steps
+DAMPING = 1e-5  # m^2, of the trunk's Newton steps
 ALIGN = 1e-3  # m, where the spine stays farther off the pelvis turns too
 
 
