@@ -19,7 +19,7 @@ from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, 
 from sixpoint.solvers.six_points.packing import end_row, limb_row, unpack_model
 
 TWIST = 0.8  # rad, largest twist of the thorax
-DAMPING = 1e-6  # m^2, of the trunk's Newton steps
+DAMPING = 1e-5  # m^2, of the trunk's Newton steps
 ALIGN = 1e-3  # m, where the spine stays farther off the pelvis turns too
 
 

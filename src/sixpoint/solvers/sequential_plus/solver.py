@@ -96,7 +96,7 @@ class Habits:
     knee_shank: float = 1.0
     knee_toes: float = 0.8
     knee_tilt: float = 0.1
-    swivel_memory: float = 0.01
+    swivel_memory: float = 0.02
     swivel_speed: float = 20.0
     turn_speed: float = 15.0
     memory: float = 0.05
