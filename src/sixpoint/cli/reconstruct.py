@@ -43,8 +43,8 @@ def reconstruct(
     weights: Annotated[
         str | None,
         Parameter(
-            help="Of sik, tgbsik, kma, ccd and the Jacobian methods: influence of wrists, ankles and the last "
-            "frame on the turn of the pelvis: 1,1,0 for boxing and kicks; 0.1,0.1,1 is steadier."
+            help="Of sik, tgbsik, kma, ccd and the Jacobian methods: influence of wrists, ankles and the "
+            "last frame on the turn of the pelvis: 1,1,0 for boxing and kicks; 0.1,0.1,1 is steadier."
         ),
     ] = None,
     search: Annotated[

@@ -234,9 +234,9 @@ features and added, give the start of pelvis, spine and head; linear maps give t
 knees. `sik-prior` then closes the trunk on the head and the limbs on their points.
 
 **Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames,
-seed {base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the hips by
-{100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard deviations). The loss
-is what is reported, squared: position error over {base.position} and orientation error over
+seed {base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the hips
+by {100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard deviations). The
+loss is what is reported, squared: position error over {base.position} and orientation error over
 {base.orientation} rad (with rotations over {turned.position} and {turned.orientation}), through closing and
 forward kinematics.
 

@@ -7,6 +7,7 @@ In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
+from sixpoint.kernels.swing_twist import clamp
 from sixpoint.solvers.sequential.frame import place_arm, place_leg
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
@@ -80,6 +81,19 @@ def start_trunk(model, s, filled, turned, local, memory, world, segs):
 
 
 @helper
+def take_start(model, s, given, turned, local, world, segs):
+    """Start the trunk as a given pose has it; a measured pelvis keeps its rotation."""
+    for k in range(segs.shape[0]):
+        if k == 0 and is_measured(turned, 0):
+            continue
+        q = qt.load(given, k)
+        if s.limits and k > 0:
+            q, _ = clamp(model.balls, k, q)
+        qt.store(local, k, q)
+    place_trunk(model.segments, local, world, segs)
+
+
+@helper
 def end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual):
     """Close the started spine on the head; returns the place of the pelvis."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
@@ -117,6 +131,13 @@ def point_limb(s, limb, n, frame, turned):
     if limb < 2:
         return pole_of_end(n, pole, end, side, s.elbow_hand, s.elbow_palm, s.elbow_grip, s.elbow_tilt)
     return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, 0.0, s.knee_tilt)
+
+
+@helper
+def pole_of_start(given, limb, n, frame):
+    """Direction of elbow or knee in a given pose, for a limb along ``n`` in ``frame``."""
+    x = qt.x_axis(qt.inv_mul(frame, qt.load(given, given.shape[0] - 4 + limb)))
+    return vec.scale(-1.0 if limb < 2 else 1.0, vec.cross(n, x))
 
 
 @helper
@@ -171,12 +192,15 @@ def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, 
 
 
 @helper
-def solve_frame(model, s, points, turned, local, memory, residual, scratch):
+def solve_frame(model, s, points, turned, given, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
+    if given.shape[0] > 0:
+        take_start(model, s, given, turned, local, world, segs)
+        x = qt.x_axis(qt.load(local, 0))
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0
@@ -185,7 +209,10 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
         target = vec.load(filled, limb + 2)
         frame, place = place_limb(model, s, limb, root, target, local, world, segs)
         n = vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place)))
-        pole = point_limb(s, limb, n, frame, turned)
+        if given.shape[0] > 0:
+            pole = pole_of_start(given, limb, n, frame)
+        else:
+            pole = point_limb(s, limb, n, frame, turned)
         pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
     return judge(lost, residual)
 
@@ -200,6 +227,7 @@ def solve_plus(
     options,
     points,
     turned,
+    given,
     state,
     rotations,
     pelvis,
@@ -208,7 +236,8 @@ def solve_plus(
 ):
     """Solve F frames in order; see ``SixPointSolver``.
 
-    ``turned`` (F, 6, 4) are measured world rotations, NaN where there is none, or (F, 0, 4).
+    ``turned`` (F, 6, 4) are measured world rotations, NaN where there is none, or (F, 0, 4); ``given``
+    (F, S + 4, 4) is the pose to start from, see ``start``, or (F, 0, 4).
     """
     model = unpack_model(table, integers, balls, chords)
     s = unpack_settings(options)
@@ -216,6 +245,8 @@ def solve_plus(
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], local, memory, residual[f], scratch)
+        outcome[f, 0] = solve_frame(
+            model, s, points[f], turned[f], given[f], local, memory, residual[f], scratch
+        )
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])

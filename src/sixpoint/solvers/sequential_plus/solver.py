@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body.figure import COINCIDENT, Figure, SpineChain
+from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.errors import SixpointError, TargetError, listed
-from sixpoint.solvers.base import Solution
+from sixpoint.solvers.base import MotionSolution, Progress, Solution
 from sixpoint.solvers.sequential.packing import work_rows
 from sixpoint.solvers.sequential_plus.frame import solve_plus
+from sixpoint.solvers.sequential_plus.start import find_start
 from sixpoint.solvers.six_points.model import build_model
 from sixpoint.solvers.six_points.packing import Model
 from sixpoint.solvers.six_points.solver import WALKING, SixPointSolver
@@ -153,6 +155,7 @@ class SequentialIKPlus(SixPointSolver):
         dt: float = 1 / 60,
         *,
         rotations: ArrayLike | None = None,
+        start: Pose | None = None,
     ) -> Solution:
         """Pose the figure for one frame.
 
@@ -162,19 +165,46 @@ class SequentialIKPlus(SixPointSolver):
             dt: Time since that frame [s]; zero or less counts as no time.
             rotations: (6, 4) their world rotations xyzw, identity in the neutral pose; NaN where unknown.
                 Only those of ``self.rotations`` are read, and they must be given.
+            start: A pose of the rig to start from in place of the method's own start: the trunk as it is
+                there closes on the head, elbows and knees point where they do there.
 
         Raises:
             TargetError: ``points`` or ``rotations`` has another shape, or asked-for rotations are missing.
+            SkeletonError: ``start`` is of another rig.
             SixpointError: ``previous`` is of another figure.
         """
         frame = as_points(points)
         given = None if rotations is None else np.asarray(rotations, float)[None]
-        return self._solve_frame(frame, self._beside(Targets(frame[None], 1.0, given)), previous, dt)
+        pose = None if start is None else Motion.from_poses([start], 1.0)
+        return self._solve_frame(frame, self._beside(Targets(frame[None], 1.0, given), pose), previous, dt)
 
-    def _beside(self, targets: Targets) -> tuple[Array, ...]:
-        """The rotations that are used (F, 6, 4), NaN where unknown; (F, 0, 4) where none are asked for."""
-        if not self.rotations:
-            return (np.empty((len(targets), 0, 4)),)
+    def solve_frames(
+        self, targets: Targets, progress: Progress | None = None, *, start: Motion | None = None
+    ) -> MotionSolution:
+        """Pose the figure for every frame.
+
+        Args:
+            targets: Where the six points are.
+            progress: Called with the number of frames done, every few hundred frames.
+            start: A motion of the rig to start each frame from, see ``solve``: an earlier take, or what a
+                database or a model of your own says.
+
+        Raises:
+            TargetError: Asked-for rotations are missing.
+            SkeletonError: ``start`` is of another rig or length.
+        """
+        return self._solve_frames(targets, self._beside(targets, start), progress)
+
+    def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
+        """Used rotations (F, 6, 4), NaN where unknown, and the start; (F, 0, 4) where there are none."""
+        nothing = np.empty((len(targets), 0, 4))
+        turned = self._find_rotations(targets) if self.rotations else nothing
+        if start is None:
+            return turned, nothing
+        chain = SpineChain.from_figure(self.figure, own_pelvis=True)
+        return turned, find_start(self.figure, chain, start, len(targets))
+
+    def _find_rotations(self, targets: Targets) -> Array:
         if targets.rotations is None:
             raise TargetError(
                 f"this solver takes the rotations of {listed(self.rotations)}, but {targets.name} has none; "
@@ -187,9 +217,7 @@ class SequentialIKPlus(SixPointSolver):
             length = np.linalg.norm(given, axis=1, keepdims=True)
             usable = np.isfinite(length) & (length > 1e-6)
             turned[:, k] = np.where(usable, given / np.where(usable, length, 1.0), np.nan)
-            if len(targets) > 1 and not usable.any():
-                raise TargetError(f"{targets.name} has no rotation of {name} in any frame")
-        return (turned,)
+        return turned
 
     def _options(self, dt: float) -> Array:
         known = self._adapted.get(dt)

@@ -36,8 +36,9 @@ def see_points(facts, filled, frame, told, velocity, mean, features):
         else:
             put(features, at, (mean[at], mean[at + 1], mean[at + 2]))
     put(features, 15, qt.inv_mul_vec(frame, UP))
+    told = vec.scale(1.0 / tall, told)
     put(features, 18, vec.scale(1.0 / sqrt(1.0 + vec.dot(told, told)), qt.inv_mul_vec(frame, told)))
-    put(features, 21, qt.inv_mul_vec(frame, velocity))
+    put(features, 21, vec.scale(1.0 / tall, qt.inv_mul_vec(frame, velocity)))
     ratio = min(vec.norm(vec.sub(vec.load(filled, 1), pelvis)) / facts.whole, 1.0)
     features[24] = ratio
     features[25] = sqrt(1.0 - ratio * ratio + 1e-4)

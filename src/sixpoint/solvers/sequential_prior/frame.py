@@ -112,6 +112,10 @@ def rotation_at(course, station):
 def lean_on(model, s, facts, thought, held, frame, trust, local):
     """Turn the started trunk as far to what the prior says as it is trusted."""
     out, course, count = thought.out, thought.course, model.segments.shape[0]
+    row = end_row(count, 0)
+    if trust == 0.0:
+        qt.store(local, row, qt.IDENTITY)
+        return
     lay_course(out, course)
     if not held:
         told = qt.mul(frame, qt.exp((out[0], out[1], out[2])))
@@ -124,7 +128,6 @@ def lean_on(model, s, facts, thought, held, frame, trust, local):
             q, _ = clamp(model.balls, k, q)
         qt.store(local, k, q)
         before = here
-    row = end_row(count, 0)
     head = qt.scaled(qt.exp((out[18], out[19], out[20])), trust)
     if s.limits:
         head, _ = clamp(model.balls, row, head)

@@ -6,11 +6,14 @@ from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
+from sixpoint.body.motion import Motion
+from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.sequential_plus.solver import SequentialIKPlus
 from sixpoint.solvers.sequential_prior.frame import solve_prior
@@ -67,6 +70,11 @@ class SequentialIKPrior(SequentialIKPlus):
     def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
         return (*super()._lower(model), pack_facts(self._find_facts(model)), *self._networks)
 
+    def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
+        if start is not None:
+            raise SixpointError("the prior is the start; SequentialIKPlus takes another one")
+        return super()._beside(targets)[:1]
+
     def _find_facts(self, model: Model) -> Facts:
         """What the features need of the figure."""
         figure = self.figure
@@ -107,7 +115,7 @@ def read_prior(path: Path | None) -> tuple[Array, Array]:
             )
     except OSError as error:
         raise SixpointError(f"{source}: the prior cannot be read: {error}") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
         raise SixpointError(f"{source} is no prior as `sixpoint study prior` writes it: {error}") from error
 
 

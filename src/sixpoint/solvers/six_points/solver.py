@@ -140,12 +140,18 @@ class SixPointSolver(ABC):
             targets: Where the six points are.
             progress: Called with the number of frames done, every few hundred frames.
         """
+        return self._solve_frames(targets, self._beside(targets), progress)
+
+    def _solve_frames(
+        self, targets: Targets, beside: tuple[Array, ...], progress: Progress | None
+    ) -> MotionSolution:
+        """Every frame; ``beside`` are arrays of as many frames."""
         frames, joints = len(targets), len(self.figure.skeleton)
         rotations, pelvis = np.empty((frames, joints, 4)), np.empty((frames, 3))
         outcome, residual = np.empty((frames, 2), np.int64), np.empty((frames, 6))
         state = self._start.copy()
         # Read-only arrays are another type to Numba: one more compilation.
-        given = (targets.positions.copy(), *self._beside(targets))
+        given = (targets.positions.copy(), *beside)
         fixed = (*self._arrays, *self._make_work(), self._options(1.0 / targets.rate))
         step = CHUNK if progress else frames
         for first in range(0, frames, step):

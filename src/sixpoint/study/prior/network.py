@@ -57,7 +57,7 @@ def point_features(b: Frames, points: Tensor, frame: Tensor) -> Tensor:
     middle = b.hips.mean(1)
     base = points[:, 0] + turns.turn(frame, middle)
     seen = turns.turn(back[:, None], points[:, 1:] - base[:, None]) / tall[..., None]
-    told = turns.turn(back, b.told)
+    told = turns.turn(back, b.told) / tall
     whole = turns.length(b.segments).squeeze(-1).sum(-1, keepdim=True)
     ratio = (turns.length(points[:, 1] - points[:, 0]) / whole).clamp(max=1.0)
     spread = turns.length(points[:, 2] - points[:, 3]) / tall
@@ -77,7 +77,7 @@ def point_features(b: Frames, points: Tensor, frame: Tensor) -> Tensor:
             seen.flatten(1),
             turns.turn(back, UP.expand(len(points), 3)),
             told / torch.sqrt(1.0 + turns.dot(told, told)),
-            turns.turn(back, b.velocity),
+            turns.turn(back, b.velocity) / tall,
             ratio,
             torch.sqrt(1.0 - ratio**2 + 1e-4),
             spread,
