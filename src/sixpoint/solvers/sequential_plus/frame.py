@@ -1,7 +1,8 @@
 """One frame of SIK+: pelvis, trunk, clavicles, limbs, in closed form but for the trunk's few Newton steps.
 
 In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
-5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s].
+5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s]; the fourth numbers of the
+first three rows are the pelvis' point, which the posed pelvis may miss.
 """
 
 from math import atan2
@@ -49,11 +50,12 @@ def estimate_pelvis(filled, memory, s):
     chest = vec.madd(pelvis, CHEST, vec.sub(head, pelvis))
     velocity = vec.load(memory, 6)
     if began and filled[0, 3] > 0.0:
-        now = vec.scale(s.rate, vec.sub(pelvis, vec.load(memory, 2)))
+        now = vec.scale(s.rate, vec.sub(pelvis, (memory[0, 3], memory[1, 3], memory[2, 3])))
         if vec.norm(now) > RUN:
             now = vec.scale(RUN / vec.norm(now), now)
         velocity = vec.add(vec.scale(s.kept_speed, velocity), vec.scale(1.0 - s.kept_speed, now))
     vec.store(memory, 6, velocity)
+    memory[0, 3], memory[1, 3], memory[2, 3] = pelvis
     told = tell_x(filled, y, chest, velocity, s.wrist_line, s.ankle_line, s.reach, s.speed)
     if memory[4, 1] > 0.0:
         told = vec.add(vec.scale(s.kept, vec.load(memory, 1)), vec.scale(1.0 - s.kept, told))
