@@ -22,6 +22,7 @@ benchmark: $(VENV)/run.stamp  ## Time a warm solver beside forward kinematics
 
 results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/results.md
 	$(BIN)/python benchmarks/paper_table.py
+	$(BIN)/python benchmarks/sik_plus_table.py --write
 
 comparison: $(VENV)/run.stamp  ## Compare all methods on the paper's clips and rewrite docs/results.md
 	$(BIN)/python benchmarks/comparison.py

@@ -71,7 +71,7 @@ def test_the_first_frame_is_what_numpy_says(arrays):
     pelvis = world_matrices(sp.Motion.from_poses([solver.solve(points).pose], 60.0))[1][0, 0]
     plain = sp.SequentialIKPlus(FIGURE, limits=False).solve(points)
     frame = world_matrices(sp.Motion.from_poses([plain.pose], 60.0))[1][0, 0]
-    told = plain.state[0][-7, :3]
+    told = plain.state[0][-8, :3]
     there = see(FIGURE, points, frame, told, np.zeros(3))
     flip = np.diag([-1.0, 1.0, 1.0])
     swapped = points[ORDER] @ flip
@@ -204,7 +204,7 @@ def test_a_wrong_memory_is_forgotten():
     solution = solver.solve(points[0])
     right = solution.pose
     state = solution.state[0].copy()
-    for row in (-8, -7, -1):  # X axis, what told it, X axis low-passed
+    for row in (-9, -8, -1):  # X axis, what told it, X axis low-passed
         state[row, :3] *= [-1.0, 1.0, -1.0]
     solution = sp.Solution(solution.pose, solution.status, solution.residual, 1, (state,))
     for p in points:

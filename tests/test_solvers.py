@@ -57,7 +57,10 @@ class Promise:
 DAMPED = Promise(0.016, 1.0, 0.0215, neutral=0.0055, stretched=0.3, settled=200, scaled=0.012, others=2.3e-3)
 PROMISES = {
     "sik": Promise(),
-    "sik+": Promise(rest=0.038, free=0.046, neutral=1e-9, scaled=2.3e-5, others=1e-9, upright=True),
+    # The trunk is closed to 0.1 micrometres; pelvis and swivel angles turn at a bounded speed.
+    "sik+": Promise(
+        rest=0.038, free=0.046, neutral=1e-7, settled=60, scaled=2.5e-4, others=1e-7, upright=True
+    ),
     "tgbsik": Promise(),
     # Rest: CCD, which bends the spine of both from the head, turns its last joint by 36 degrees with limits
     # and by 59 without, as the estimated pelvis (Y along pelvis to head) is not the neutral one. No margin.

@@ -1,7 +1,8 @@
 """One frame of SIK+: pelvis, trunk, clavicles, limbs, in closed form but for the trunk's few Newton steps.
 
 In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
-5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s].
+5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s], row 7 its point, which the
+posed pelvis may miss [m].
 """
 
 from sixpoint.kernels import quaternion as qt

@@ -78,11 +78,12 @@ def estimate_pelvis(filled, memory, s):
     chest = vec.madd(pelvis, CHEST, vec.sub(head, pelvis))
     velocity = vec.load(memory, 6)
     if began and filled[0, 3] > 0.0:
-        now = vec.scale(s.rate, vec.sub(pelvis, vec.load(memory, 2)))
+        now = vec.scale(s.rate, vec.sub(pelvis, vec.load(memory, 7)))
         if vec.norm(now) > RUN:
             now = vec.scale(RUN / vec.norm(now), now)
         velocity = vec.add(vec.scale(s.kept_speed, velocity), vec.scale(1.0 - s.kept_speed, now))
     vec.store(memory, 6, velocity)
+    vec.store(memory, 7, pelvis)
     told = tell_x(filled, y, chest, velocity, s.wrist_line, s.ankle_line, s.reach, s.speed)
     if memory[4, 1] > 0.0:
         told = vec.add(vec.scale(s.kept, vec.load(memory, 1)), vec.scale(1.0 - s.kept, told))

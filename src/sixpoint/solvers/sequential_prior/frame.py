@@ -2,7 +2,7 @@
 
 The prior sees the points in a frame near the pelvis: Y as SIK+ estimates it, X that of the frame before; or
 the measured rotation of the pelvis. ``memory`` as in ``sequential_plus.frame``, with the X axis of the posed
-pelvis in row 0; row 7 is that axis low-passed.
+pelvis in row 0; row 8 is that axis low-passed.
 """
 
 from math import exp
@@ -73,7 +73,7 @@ def see_frame(memory, y, plain):
 
     ``plain`` is the pelvis as SIK+ has it. A memory that contradicts what is told is not trusted.
     """
-    x = vec.unit(vec.reject(vec.load(memory, 7), y))
+    x = vec.unit(vec.reject(vec.load(memory, 8), y))
     if vec.norm(x) < 0.5:
         return plain, 1.0
     told = vec.unit(vec.reject(vec.load(memory, 1), y))
@@ -84,10 +84,10 @@ def see_frame(memory, y, plain):
 @helper
 def remember_x(memory, x, dt):
     """Let the remembered X axis follow that of the posed pelvis."""
-    before = vec.load(memory, 7)
+    before = vec.load(memory, 8)
     kept = exp(-dt / LAG) if vec.norm(before) > 0.5 else 0.0
     now = vec.unit(vec.add(vec.scale(kept, before), vec.scale(1.0 - kept, x)))
-    vec.store(memory, 7, now if vec.norm(now) > 0.5 else x)
+    vec.store(memory, 8, now if vec.norm(now) > 0.5 else x)
 
 
 @helper

@@ -180,7 +180,8 @@ class SixPointSolver(ABC):
         points = rest[[r.pelvis, r.head, *r.wrist, *r.ankle]]
         points[1] += self.figure.head_offset
         neutral = np.tile(rot.IDENTITY, (1, len(EFFECTORS), 1))
-        self.solve_frames(Targets(points[None], 60.0, neutral))
+        targets = Targets(points[None], 60.0, neutral)
+        self._solve_frame(as_points(points), self._beside(targets), None, 1 / 60)
 
     def _state_after(self, previous: Solution | None) -> Array:
         if previous is None:
