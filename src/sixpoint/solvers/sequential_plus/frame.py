@@ -2,7 +2,7 @@
 
 In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
 5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s], row 7 its point, which the
-posed pelvis may miss [m].
+posed pelvis may miss [m], row 8 its low-passed Y axis.
 """
 
 from sixpoint.kernels import quaternion as qt
@@ -82,16 +82,15 @@ def start_trunk(model, s, filled, turned, local, memory, world, segs):
 
 
 @helper
-def take_start(model, s, given, turned, local, world, segs):
+def take_start(model, s, given, turned, local):
     """Start the trunk as a given pose has it; a measured pelvis keeps its rotation."""
-    for k in range(segs.shape[0]):
+    for k in range(model.segments.shape[0]):
         if k == 0 and is_measured(turned, 0):
             continue
         q = qt.load(given, k)
         if s.limits and k > 0:
             q, _ = clamp(model.balls, k, q)
         qt.store(local, k, q)
-    place_trunk(model.segments, local, world, segs)
 
 
 @helper
@@ -177,6 +176,7 @@ def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, 
         began,
         qt.load(local, row),
         qt.load(local, row + 2),
+        s.swivel_lag,
         s.swivel_memory,
         s.swivel_speed,
         s.dt,
@@ -200,8 +200,9 @@ def solve_frame(model, s, points, turned, given, local, memory, residual, scratc
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
     if given.shape[0] > 0:
-        take_start(model, s, given, turned, local, world, segs)
+        take_start(model, s, given, turned, local)
         x = qt.x_axis(qt.load(local, 0))
+        place_trunk(model.segments, local, world, segs)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0

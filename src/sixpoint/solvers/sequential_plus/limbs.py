@@ -44,13 +44,14 @@ def carried_angle(n, u, h, upper, hinge, l1, l2):
 
 
 @helper
-def approach(before, clear, memory, fastest, dt):
+def approach(before, clear, lag, memory, fastest, dt):
     """Where a swivel angle ``before`` is after a frame on its way to 0 [rad].
 
-    It gets there at once where the pole is clear (1: across the limb's line), and the slower the nearer the
-    pole is to that line (0), where its direction means nothing; never faster than ``fastest`` [rad/s].
+    It gets there with a ``lag`` [s] where the pole is clear (1: across the limb's line), and the slower the
+    nearer the pole is to that line (0), where its direction means nothing; never faster than ``fastest``
+    [rad/s].
     """
-    lag = memory * (1.0 / max(clear * clear, 1e-6) - 1.0)
+    lag += memory * (1.0 / max(clear * clear, 1e-6) - 1.0)
     kept = lag / (lag + dt) if lag > 0.0 else 0.0
     most = fastest * dt
     return before + min(max((kept - 1.0) * before, -most), most)
@@ -114,7 +115,7 @@ def close_at(target, n, u, cosine, sine, phi, l1, l2, h, balls, ball, low, high)
 
 @helper
 def solve_by_pole(
-    target, l1, l2, h, pole, began, upper, hinge, memory, fastest, dt, limits, balls, ball, low, high
+    target, l1, l2, h, pole, began, upper, hinge, lag, memory, fastest, dt, limits, balls, ball, low, high
 ):
     """Limb whose middle joint points towards ``pole``, or is on its way there.
 
@@ -132,7 +133,7 @@ def solve_by_pole(
     before, phi = 0.0, 0.0
     if began:
         before = carried_angle(n, u, h, upper, hinge, l1, l2)
-        phi = approach(before, vec.norm(vec.reject(pole, n)), memory, fastest, dt)
+        phi = approach(before, vec.norm(vec.reject(pole, n)), lag, memory, fastest, dt)
     if limits:
         if not low <= flexion <= high:
             return close_at(target, n, u, cosine, sine, phi, l1, l2, h, balls, ball, low, high)

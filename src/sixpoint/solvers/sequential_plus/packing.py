@@ -11,6 +11,7 @@ class Settings(NamedTuple):
     Attributes:
         kept: Share of what told X that is kept over the frame.
         kept_speed: Share of the velocity that is kept over the frame.
+        kept_tilt: Share of the Y axis that is kept over the frame.
         rate: Frames per second; 0 where no time passed [Hz].
         dt: Time of the frame [s].
         head_site: Whether the head is an end site, turned by the last trunk joint.
@@ -45,11 +46,13 @@ class Settings(NamedTuple):
     knee_shank: float
     knee_toes: float
     knee_tilt: float
+    swivel_lag: float
     swivel_memory: float
     swivel_speed: float
     turn_speed: float
     kept: float
     kept_speed: float
+    kept_tilt: float
     rate: float
     dt: float
     head_site: bool
@@ -95,5 +98,7 @@ def unpack_settings(options):
         options[33],
         options[34],
         options[35],
-        options[36] > 0.0,
+        options[36],
+        options[37],
+        options[38] > 0.0,
     )

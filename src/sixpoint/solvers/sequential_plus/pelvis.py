@@ -75,6 +75,10 @@ def estimate_pelvis(filled, memory, s):
     if vec.norm(chord) < 0.5:
         chord = vec.load(memory, 5) if began else (0.0, 1.0, 0.0)
     y = estimate_y(filled, chord, s.chord_share, s.leg_share)
+    if began:
+        slow = vec.unit(vec.add(vec.scale(s.kept_tilt, vec.load(memory, 8)), vec.scale(1.0 - s.kept_tilt, y)))
+        y = slow if vec.norm(slow) > 0.5 else y
+    vec.store(memory, 8, y)
     chest = vec.madd(pelvis, CHEST, vec.sub(head, pelvis))
     velocity = vec.load(memory, 6)
     if began and filled[0, 3] > 0.0:

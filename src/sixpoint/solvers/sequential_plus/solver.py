@@ -62,12 +62,14 @@ class Habits:
         knee_shank: How much a knee points along the foot's vertical axis.
         knee_toes: How much it points where the toes do.
         knee_tilt: How much the knee's axis follows the foot's vertical one.
+        swivel_lag: Time constant of a swivel angle where the pole is across the limb's line [s].
         swivel_memory: Time constant of a swivel angle where the pole is 45 degrees from the limb's line; it
             is zero across the line and grows without bound along it [s].
         swivel_speed: Largest change of a swivel angle, but for what limits ask [rad/s].
         turn_speed: Largest speed of the pelvis about its Y [rad/s].
         memory: Time constant of what tells the pelvis' X axis [s].
         speed_memory: Time constant of the pelvis' velocity [s].
+        tilt_memory: Time constant of the pelvis' Y axis [s].
     """
 
     chord_share: float = 0.35
@@ -98,11 +100,13 @@ class Habits:
     knee_shank: float = 1.0
     knee_toes: float = 0.8
     knee_tilt: float = 0.1
+    swivel_lag: float = 0.05
     swivel_memory: float = 0.02
     swivel_speed: float = 20.0
     turn_speed: float = 15.0
     memory: float = 0.05
     speed_memory: float = 0.15
+    tilt_memory: float = 0.05
 
 
 class SequentialIKPlus(SixPointSolver):
@@ -225,8 +229,9 @@ class SequentialIKPlus(SixPointSolver):
             if len(self._adapted) > 100:
                 self._adapted.clear()
             time = min(dt, 1e3) if dt > 0 else 0.0
-            *numbers, memory, speed_memory = astuple(self.habits)
-            kept = [exp(-time / constant) if constant > 0 else 0.0 for constant in (memory, speed_memory)]
+            *numbers, memory, speed_memory, tilt_memory = astuple(self.habits)
+            times = (memory, speed_memory, tilt_memory)
+            kept = [exp(-time / constant) if constant > 0 else 0.0 for constant in times]
             rate = 1.0 / time if time > 1e-6 else 0.0
             site = float(np.linalg.norm(self.figure.head_offset) > COINCIDENT)
             known = self._adapted[dt] = np.array([self.limits, *numbers, *kept, rate, time, site], float)

@@ -2,7 +2,7 @@
 
 The prior sees the points in a frame near the pelvis: Y as SIK+ estimates it, X that of the frame before; or
 the measured rotation of the pelvis. ``memory`` as in ``sequential_plus.frame``, with the X axis of the posed
-pelvis in row 0; row 8 is that axis low-passed.
+pelvis in row 0; row 9 is that axis low-passed.
 """
 
 from math import exp
@@ -22,7 +22,6 @@ from sixpoint.solvers.sequential_plus.frame import (
 )
 from sixpoint.solvers.sequential_plus.measured import is_measured
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
-from sixpoint.solvers.sequential_plus.pelvis import estimate_y
 from sixpoint.solvers.sequential_prior.features import (
     see_end,
     see_limb,
@@ -73,7 +72,7 @@ def see_frame(memory, y, plain):
 
     ``plain`` is the pelvis as SIK+ has it. A memory that contradicts what is told is not trusted.
     """
-    x = vec.unit(vec.reject(vec.load(memory, 8), y))
+    x = vec.unit(vec.reject(vec.load(memory, 9), y))
     if vec.norm(x) < 0.5:
         return plain, 1.0
     told = vec.unit(vec.reject(vec.load(memory, 1), y))
@@ -84,10 +83,10 @@ def see_frame(memory, y, plain):
 @helper
 def remember_x(memory, x, dt):
     """Let the remembered X axis follow that of the posed pelvis."""
-    before = vec.load(memory, 8)
+    before = vec.load(memory, 9)
     kept = exp(-dt / LAG) if vec.norm(before) > 0.5 else 0.0
     now = vec.unit(vec.add(vec.scale(kept, before), vec.scale(1.0 - kept, x)))
-    vec.store(memory, 8, now if vec.norm(now) > 0.5 else x)
+    vec.store(memory, 9, now if vec.norm(now) > 0.5 else x)
 
 
 @helper
@@ -135,7 +134,7 @@ def lean_on(model, s, facts, thought, held, frame, trust, local):
 
 
 @helper
-def ask_prior(model, s, facts, places, turns, turned, filled, chord, memory, thought, local):
+def ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local):
     """Start the trunk where the prior says, as far as it is trusted; returns that."""
     held = is_measured(turned, 0)
     told, velocity = vec.load(memory, 1), vec.load(memory, 6)
@@ -143,8 +142,7 @@ def ask_prior(model, s, facts, places, turns, turned, filled, chord, memory, tho
     network = turns
     if not held:
         network = places
-        y = estimate_y(filled, chord, s.chord_share, s.leg_share)
-        frame, trust = see_frame(memory, y, frame)
+        frame, trust = see_frame(memory, vec.load(memory, 8), frame)
     see_points(facts, filled, frame, told, velocity, network.mean, thought.features)
     if held:
         see_rotations(turned, frame, thought.features)
@@ -176,7 +174,7 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
     _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
-    trust = ask_prior(model, s, facts, places, turns, turned, filled, chord, memory, thought, local)
+    trust = ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local)
     place_trunk(model.segments, local, world, segs)
     x = qt.x_axis(qt.load(local, 0))
     remember_x(memory, x, s.dt)
