@@ -1,0 +1,265 @@
+"""Calibrate six trackers: mounts and lengths, and what could not be found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.figure import Figure
+from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.calibration.estimate import Estimate
+from sixpoint.calibration.legs import LegFit, fit_legs
+from sixpoint.calibration.lengths import compute_stature, measure_lengths
+from sixpoint.calibration.model import Body
+from sixpoint.calibration.pivots import find_pivots
+from sixpoint.calibration.standing import UP, Posture, Standing, compute_heading, find_standing
+from sixpoint.calibration.tracks import Tracks
+from sixpoint.errors import TargetError
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+GOOD = 0.01  # an offset that is known to this standard deviation is observed [m]
+USELESS = 0.05  # one that is known less well than this is not handed out [m]
+POSTURE_STD = np.radians(5.0)  # how exactly a person holds a pose [rad]
+HEAD_RATIO = 0.91  # height of a head tracker over the stature, roughly
+MOVES = {
+    1: "nod, shake and tilt the head with the chest still",
+    2: "circle the hand with the elbow at the waist",
+    3: "circle the hand with the elbow at the waist",
+    4: "lift the straight leg, hold it and circle the foot widely",
+    5: "lift the straight leg, hold it and circle the foot widely",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """How a tracker sits on its segment.
+
+    Attributes:
+        offset: (3,) from the joint to the tracker in the tracker's frame [m]; NaN where it was not found.
+        rotation: (4,) segment<-tracker; NaN where it was not found.
+        std: Largest standard deviation of the offset in any direction [m].
+        rotation_std: Of the rotation, which is how exactly the pose was held [rad].
+    """
+
+    offset: Array
+    rotation: Array
+    std: float = float("inf")
+    rotation_std: float = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a recording tells about a person and six trackers.
+
+    Attributes:
+        stature: [m].
+        segments: Segment lengths by name [m], as for ``Figure.from_segments``; empty with a given figure.
+        sources: Where each comes from.
+        mounts: Effector -> how its tracker is mounted.
+        unobserved: What the data does not tell -> why, and what would.
+        given: The figure that was given.
+    """
+
+    stature: float
+    segments: dict[str, float]
+    sources: dict[str, str]
+    mounts: dict[str, Mount]
+    unobserved: dict[str, str] = field(default_factory=dict)
+    given: Figure | None = None
+
+    def figure(self) -> Figure:
+        """The figure that was given, or the built-in one with the lengths found."""
+        return self.given if self.given is not None else Figure.from_segments(**self.segments)
+
+    def apply(self, targets: Targets) -> Targets:
+        """Trackers -> joint positions and segment rotations.
+
+        A point whose offset was not found is lost (NaN), a rotation whose mount was not found has none:
+        give them a mount of your own with ``dataclasses.replace`` if you know better. Targets without
+        rotations are taken as joints already.
+        """
+        if targets.rotations is None:
+            return targets
+        offsets = np.array([self.mounts[name].offset for name in EFFECTORS])
+        mounts = np.array([self.mounts[name].rotation for name in EFFECTORS])
+        turned = rot.normalised(targets.rotations)
+        turned = np.where(np.isfinite(targets.rotations).all(axis=-1, keepdims=True), turned, np.nan)
+        positions = targets.positions - rot.mul_vec(turned, offsets)
+        return Targets(positions, targets.rate, rot.mul(turned, rot.inv(mounts)), targets.name)
+
+
+def calibrate(
+    targets: Targets,
+    figure: Figure | None = None,
+    *,
+    stature: float | None = None,
+    posture: Posture | None = None,
+    floor: float | None = 0.0,
+) -> Calibration:
+    """Find mounts and lengths from a still pose and about ten seconds of movement.
+
+    Args:
+        targets: Six trackers with rotations, or, without rotations, six joints (then lengths only).
+        figure: The person's own figure where the lengths are known.
+        stature: The person's stature where it is known [m].
+        posture: The pose that was held, "neutral" or "t"; by default it is told from the wrists' span.
+        floor: Height of the floor in the trackers' world [m]; None where it is not known.
+
+    Raises:
+        TargetError: Too few frames, or no standing pose where lengths have to be measured.
+    """
+    tracks = Tracks.from_targets(targets)
+    standing = find_standing(tracks, posture)
+    if standing is None and figure is None:
+        raise TargetError(
+            "no still standing pose found: stand upright and still for two seconds with all six trackers seen, "
+            "arms hanging or stretched to the sides (or give a figure, if only mounts are sought)"
+        )
+    if targets.rotations is None:
+        return _joints_only(tracks, standing, figure, stature)
+    body, own = _prior_body(standing, figure, stature)
+    mounts = np.full((6, 3, 3), np.nan) if standing is None else standing.mounts
+    estimates = _pivots(tracks, standing, mounts, body)
+    legs: LegFit | None = None
+    if standing is not None:
+        estimates = _with_heights(estimates, standing, body, floor)
+        standing = _with_heading(standing, estimates)
+        mounts = standing.mounts
+        if figure is None and stature is None and estimates[1].std < USELESS:
+            body = Body.from_stature(_stature(standing, estimates), found=True)
+        if np.isfinite(mounts[0]).all() and max(estimates[4].std, estimates[5].std) < USELESS:
+            legs = fit_legs(tracks, standing, mounts[0], (estimates[4], estimates[5]), body)
+    if legs is not None:
+        estimates = [legs.pelvis, *estimates[1:4], *legs.ankles]
+    found = {name: _mount(e, m) for name, e, m in zip(EFFECTORS, estimates, mounts, strict=True)}
+    unobserved = _unobserved(found, standing, targets)
+    if figure is not None:
+        return Calibration(body.stature, {}, {}, found, unobserved, figure)
+    assert standing is not None
+    offsets = np.array([found[name].offset for name in EFFECTORS])
+    unknown = [n for n, o in zip(EFFECTORS, offsets, strict=True) if n not in ("l_wrist", "r_wrist") and np.isnan(o).any()]
+    joints = standing.positions - np.einsum("kij,kj->ki", standing.turns, np.where(np.isnan(offsets), 0.0, offsets))
+    if unknown:
+        unobserved["lengths"] = f"the offsets of {', '.join(unknown)} go into them and are not known"
+    joints[2:4][np.isnan(offsets[2:4]).any(axis=1)] = np.nan
+    moved = tracks.joints(offsets)
+    span = _largest(np.linalg.norm(moved[:, 2] - moved[:, 3], axis=1))
+    lengths = measure_lengths(joints, standing.posture, span, stature, None if legs is None else legs.length)
+    return Calibration(lengths.stature, lengths.segments, lengths.sources, found, unobserved)
+
+
+def _joints_only(
+    tracks: Tracks, standing: Standing | None, figure: Figure | None, stature: float | None
+) -> Calibration:
+    """Lengths from six joints; nothing is known of mounts."""
+    nothing = {name: Mount(np.full(3, np.nan), np.full(4, np.nan)) for name in EFFECTORS}
+    why = {"mounts": "the trackers have no rotations: their points are taken as the joints"}
+    if figure is not None or standing is None:
+        assert figure is not None
+        return Calibration(Body.from_figure(figure).stature, {}, {}, nothing, why, figure)
+    span = _largest(np.linalg.norm(tracks.positions[:, 2] - tracks.positions[:, 3], axis=1))
+    lengths = measure_lengths(standing.positions, standing.posture, span, stature)
+    return Calibration(lengths.stature, lengths.segments, lengths.sources, nothing, why)
+
+
+def _largest(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.max()) if len(known) else float("nan")
+
+
+def _prior_body(standing: Standing | None, figure: Figure | None, stature: float | None) -> tuple[Body, bool]:
+    if figure is not None:
+        return Body.from_figure(figure), True
+    if stature is not None:
+        return Body.from_stature(stature, found=False), True
+    assert standing is not None
+    height = float(standing.positions[1, 1] - standing.positions[4:, 1].mean()) / (HEAD_RATIO - 0.04)
+    return Body.from_stature(float(np.clip(height, 0.4, 2.8)), found=True), False
+
+
+def _pivots(tracks: Tracks, standing: Standing | None, mounts: Array, body: Body) -> list[Estimate]:
+    estimates = [Estimate.nothing()]
+    for k, rest in body.rests(mounts).items():
+        axis = mounts[k].T @ UP if np.isfinite(mounts[k]).all() else None
+        ground = _ground(tracks, standing, k) if k >= 4 else None
+        points, turns = tracks.positions[:, k], tracks.turns[:, k]
+        estimates.append(find_pivots(points, turns, tracks.rotations[:, k], tracks.rate, axis, rest, ground))
+    return estimates
+
+
+def _ground(tracks: Tracks, standing: Standing | None, k: int) -> tuple[Array, Array]:
+    """Position and rotation of a foot tracker while the foot stands: in the still pose, else where it is lowest."""
+    if standing is not None:
+        return standing.positions[k], standing.turns[k]
+    height = np.where(np.isfinite(tracks.turns[:, k]).all(axis=(1, 2)), tracks.positions[:, k, 1], np.inf)
+    lowest = int(np.argmin(height))
+    return tracks.positions[lowest, k], tracks.turns[lowest, k]
+
+
+def _with_heights(
+    estimates: list[Estimate], standing: Standing, body: Body, floor: float | None
+) -> list[Estimate]:
+    """Add what the heights of a standing person tell of the offsets: one direction of each."""
+    if floor is None:
+        return estimates
+    heights = body.heights(standing.posture) + floor
+    out = [estimates[0]]
+    for k in range(1, 6):
+        std = body.height_std[k // 2]
+        if np.isfinite(std) and np.isfinite(standing.turns[k]).all():
+            up = standing.turns[k].T @ UP
+            value = standing.positions[k, 1] - heights[k]
+            height = Estimate(value * up, np.outer(up, up) / std**2)
+            out.append(Estimate.fuse([estimates[k], height]))
+        else:
+            out.append(estimates[k])
+    return out
+
+
+def _known(estimates: list[Estimate]) -> Array:
+    return np.array([e.offset if e.std < USELESS else np.zeros(3) for e in estimates])
+
+
+def _with_heading(standing: Standing, estimates: list[Estimate]) -> Standing:
+    """The standing pose with the heading of its joints instead of that of its trackers."""
+    turns = np.where(np.isfinite(standing.turns), standing.turns, 0.0)
+    joints = standing.positions - np.einsum("kij,kj->ki", turns, _known(estimates))
+    return Standing(
+        standing.frames, standing.posture, standing.positions, standing.turns, compute_heading(joints)
+    )
+
+
+def _stature(standing: Standing, estimates: list[Estimate]) -> float:
+    turns = np.where(np.isfinite(standing.turns), standing.turns, 0.0)
+    joints = standing.positions - np.einsum("kij,kj->ki", turns, _known(estimates))
+    return compute_stature(float(joints[1, 1] - joints[4:, 1].mean()))
+
+
+def _mount(estimate: Estimate, mount: Array) -> Mount:
+    known = bool(np.isfinite(mount).all())
+    rotation = Rotation.from_matrix(mount).as_quat() if known else np.full(4, np.nan)
+    useful = estimate.std < USELESS
+    return Mount(
+        estimate.offset if useful else np.full(3, np.nan),
+        np.asarray(rotation, float),
+        estimate.std,
+        POSTURE_STD if known else float("inf"),
+    )
+
+
+def _unobserved(mounts: dict[str, Mount], standing: Standing | None, targets: Targets) -> dict[str, str]:
+    out = {}
+    for k, (name, mount) in enumerate(mounts.items()):
+        if mount.std > GOOD:
+            known = f"known to {100 * mount.std:.1f} cm only" if mount.std < USELESS else "not found"
+            move = MOVES.get(k, "bow and sway on straight legs, after circling both feet")
+            out[f"{name} offset"] = f"{known}: {move}"
+        if not np.isfinite(mount.rotation_std):
+            why = "no still standing pose" if standing is None else "no rotations in the still standing pose"
+            out[f"{name} rotation"] = f"{why}: stand still for two seconds, arms hanging or stretched"
+    return out
