@@ -6,8 +6,9 @@ With straight legs of length L, hips h_i in the pelvis' frame, mount rotation M 
 
 A bow turns the pelvis against the legs, which separates height and depth of its offset from L; swaying
 sideways and lifting a leg outwards tell its third component, and so does standing upright, less exactly.
-Knees are never straight all the time, so the equation is one-sided: bent legs are short, no leg is too long. Frames
-with short legs lose their weight while the estimate improves (Blake & Zisserman 1987, graduated non-convexity).
+Knees are never straight all the time, so the equation is one-sided: bent legs are short, no leg is too long.
+Frames with short legs lose their weight while the estimate improves (graduated non-convexity, Blake &
+Zisserman 1987). It needs both ankles: with all three offsets open, bent legs explain any of them.
 """
 
 from __future__ import annotations
@@ -95,13 +96,13 @@ def fit_legs(
             right.append(-excess * weight)
         matrix = np.concatenate(rows)
         x = x + np.linalg.lstsq(matrix, np.concatenate(right), rcond=None)[0]
-    covariance = np.linalg.inv(matrix.T @ matrix)
+    covariance: Array = np.asarray(np.linalg.inv(matrix.T @ matrix), float)
     vague = covariance[:3, :3] + body.hip_std**2 * np.eye(3)
     feet = [
-        Estimate(x[s], np.linalg.inv(covariance[s, s])) for s in (slice(3, 6), slice(6, 9))
+        Estimate(x[s], np.asarray(np.linalg.inv(covariance[s, s]), float)) for s in (slice(3, 6), slice(6, 9))
     ]
     return LegFit(
-        Estimate(x[:3], np.linalg.inv(vague)),
+        Estimate(x[:3], np.asarray(np.linalg.inv(vague), float)),
         (feet[0], feet[1]),
         float(legs.mean() + x[9:].mean()),
         float(np.sqrt(covariance[9:, 9:].mean())),
@@ -130,9 +131,9 @@ def _priors(
         add(row, root @ ankle.offset, 1.0)
     p, turns = standing.positions, standing.turns
     for axis, std in zip((standing.heading[:, 0], standing.heading[:, 2]), UPRIGHT, strict=True):
-        row = np.zeros(UNKNOWNS)
-        row[:3] = axis @ turns[0]
-        row[3:6], row[6:9] = -0.5 * axis @ turns[4], -0.5 * axis @ turns[5]
+        row = np.zeros((1, UNKNOWNS))
+        row[0, :3] = axis @ turns[0]
+        row[0, 3:6], row[0, 6:9] = -0.5 * axis @ turns[4], -0.5 * axis @ turns[5]
         middle = p[0] + turns[0] @ hips.mean(axis=0) - 0.5 * (p[4] + p[5])
         add(row, np.array([axis @ middle]), std)
     return np.concatenate(rows), np.concatenate(right)

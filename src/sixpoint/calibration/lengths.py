@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body.anthropometry import segments_of_stature
 from sixpoint.body.figure import Figure
-from sixpoint.calibration.model import ANKLE_HEIGHT
 from sixpoint.calibration.standing import Posture
-from sixpoint.errors import TargetError
+from sixpoint.errors import FigureError, TargetError
 
 Array = NDArray[np.float64]
 
@@ -41,7 +40,7 @@ class Lengths:
 
 
 def compute_stature(head_over_ankles: float) -> float:
-    """Stature [m] of a person of average proportions from the height of the head joint over the ankles [m]."""
+    """Stature [m] for a height of the head joint over the ankles [m], at average proportions."""
     figure = Figure.from_stature(UNIT)
     roles, rest = figure.roles, figure.rest_positions
     ratio = (rest[roles.head] + figure.head_offset - rest[roles.ankle[0]])[1] / UNIT
@@ -67,14 +66,17 @@ def measure_lengths(
     tall, low = float(standing[1, 1]) - ankles, float(standing[0, 1]) - ankles
     if not 0.2 * tall < low < 0.9 * tall:
         raise TargetError(
-            f"the still pose is not standing: the head is {tall:.2f} m and the pelvis {low:.2f} m above the ankles"
+            f"the still pose is not standing: over the ankles, the head is {tall:.2f} m high, "
+            f"the pelvis {low:.2f} m"
         )
     given = stature is not None
     height = stature if stature is not None else compute_stature(tall)
     try:
         segments = segments_of_stature(height)
-    except Exception as error:
-        raise TargetError(f"the head is {tall:.2f} m above the ankles, which is no human's: {error}") from error
+    except FigureError as error:
+        raise TargetError(
+            f"the head is {tall:.2f} m above the ankles, which is no human's: {error}"
+        ) from error
     sources = dict.fromkeys(segments, "proportion")
 
     def share(names: tuple[str, ...], total: float, source: str) -> None:
@@ -83,20 +85,24 @@ def measure_lengths(
             segments[name] *= total / whole
             sources[name] = source
 
-    rest = _ratios(height)
+    rest = _ratios()
     if leg is not None:
         share(("thigh", "calf"), leg, "measured with the leg, split by proportion")
     else:
-        share(("thigh", "calf", "pelvis_length"), low, "measured with the pelvis' height, split by proportion")
-    share(("torso_length", "neck"), (tall - low) * rest["trunk"], "measured with the trunk, split by proportion")
+        share(
+            ("thigh", "calf", "pelvis_length"), low, "measured with the pelvis' height, split by proportion"
+        )
+    share(
+        ("torso_length", "neck"), (tall - low) * rest["trunk"], "measured with the trunk, split by proportion"
+    )
     arm = _measure_arm(standing, posture, span, segments, rest["shoulder_drop"])
     if arm is not None:
         share(("upper_arm", "forearm"), arm, "measured with the arms, split by proportion")
     return Lengths(height, segments, sources | {"stature": "given" if given else "measured"})
 
 
-def _ratios(stature: float) -> dict[str, float]:
-    """Ratios of the built-in figure: torso and neck length over head height above the pelvis, and shoulders."""
+def _ratios() -> dict[str, float]:
+    """Torso and neck, and the shoulders' drop from the head, over the head's height above the pelvis."""
     figure = Figure.from_stature(UNIT)
     roles, rest, lengths = figure.roles, figure.rest_positions, segments_of_stature(UNIT)
     head = rest[roles.head] + figure.head_offset

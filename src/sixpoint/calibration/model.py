@@ -1,17 +1,17 @@
 """What is known of the body beforehand: a figure, the person's own or one by proportion, and how sure it is.
 
-Heights are those of the neutral pose. Of all coordinates of a standing person they are known best, and they lie
-along the bones, which is where pivots are weakest.
+Heights are those of the neutral pose. Of all coordinates of a standing person they are known best, and they
+lie along the bones, which is where pivots are weakest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.anthropometry import segments_of_stature
 from sixpoint.body.figure import Figure
 from sixpoint.calibration.pivots import Rest
 from sixpoint.calibration.standing import Posture
@@ -54,7 +54,7 @@ class Body:
     def from_stature(cls, stature: float, found: bool) -> Body:
         """A person of average proportions; ``found`` where the stature comes from this recording."""
         std = STD_FOUND if found else STD_STATURE
-        return cls(Figure.from_segments(**segments_of_stature(stature)), stature, std, 0.025, 0.008)
+        return cls(Figure.from_stature(stature), stature, std, 0.025, 0.008)
 
     def heights(self, posture: Posture) -> Array:
         """(6,) heights of the effectors over the floor, standing [m]."""
@@ -62,12 +62,14 @@ class Body:
         head = rest[roles.head] + self.figure.head_offset
         arms = roles.shoulder if posture == "t" else roles.wrist
         height = [rest[roles.pelvis][1], head[1], *rest[list(arms), 1], *rest[list(roles.ankle), 1]]
-        return np.array(height) - np.mean(height[4:]) + ANKLE_HEIGHT * self.stature
+        return np.asarray(np.array(height) - np.mean(height[4:]) + ANKLE_HEIGHT * self.stature, float)
 
     @property
     def hips(self) -> Array:
         """(2, 3) from the pelvis joint to the hips in the neutral pose [m]."""
-        return np.stack([self.figure.offset_between(self.figure.roles.pelvis, h) for h in self.figure.roles.hip])
+        return np.stack(
+            [self.figure.offset_between(self.figure.roles.pelvis, h) for h in self.figure.roles.hip]
+        )
 
     @property
     def legs(self) -> Array:
@@ -85,7 +87,7 @@ class Body:
         neck = roles.spine[len(carried) :]
         links = [
             (k / len(neck), mounts[1].T @ self.figure.offset_between(a, b))
-            for k, (a, b) in enumerate(zip(neck, neck[1:], strict=False), start=1)
+            for k, (a, b) in enumerate(pairwise(neck), start=1)
             if np.isfinite(mounts[1]).all()
         ]
         arm, leg = Rest(0.154 * h, 0.05, 0.02), Rest(0.49 * h, 0.05, 0.006)

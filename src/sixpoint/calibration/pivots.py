@@ -4,8 +4,8 @@ While a hand circles and its forearm is still, the tracker moves on a sphere abo
 
     p(t) = c(t) + B phi(t) + R(t) o
 
-with o, the offset sought; c, a polynomial in time, a joint that drifts; phi, the rotation vector of R from its mean;
-and B, how the joint gives way in step with the rotation. B is what limits the method: a forearm of
+with o, the offset sought; c, a polynomial in time, a joint that drifts; phi, the rotation vector of R from
+its mean; and B, how the joint gives way in step with the rotation. B is what limits the method: a forearm of
 length f that makes a share k of the hand's rotation moves the wrist by k phi x f, which to first order looks
 exactly like an offset that is k f longer. The two differ in second order only, by phi x (phi x k f) / 2. So:
 
@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.spatial.transform import Rotation
 
 from sixpoint.calibration.estimate import Estimate
@@ -50,8 +49,8 @@ class Rest:
         bone: Length of what moves the joint [m].
         share: Standard deviation of the share of the rotation that the bone makes, too.
         stretch: The same for movement along the bone, in bone lengths per radian.
-        neck: (share of the rotation, (3,) link in the tracker's frame [m]) of links between what rests and the
-            joint, which turn along as a known share.
+        neck: (share of the rotation, (3,) link in the tracker's frame [m]) of links between what rests and
+            the joint, which turn along as a known share.
     """
 
     bone: float
@@ -61,7 +60,12 @@ class Rest:
 
 
 def find_pivots(
-    points: Array, turns: Array, rotations: Array, rate: float, axis: Array | None, rest: Rest,
+    points: Array,
+    turns: Array,
+    rotations: Array,
+    rate: float,
+    axis: Array | None,
+    rest: Rest,
     ground: tuple[Array, Array] | None = None,
 ) -> Estimate:
     """The offset of one tracker, from all windows in which its joint rests.
@@ -74,8 +78,8 @@ def find_pivots(
         axis: (3,) unit vector along the bone that carries the joint, in the tracker's frame; None where it is
             not known.
         rest: How still the joint is held.
-        ground: Position (3,) and rotation (3, 3) of the tracker while its foot stands. A standing foot rolls about
-            ball and heel, which stay where they are; only a joint that is lifted counts then.
+        ground: Position (3,) and rotation (3, 3) of the tracker while its foot stands. A standing foot rolls
+            about ball and heel, which stay where they are; only a joint that is lifted counts then.
     """
     step = max(1, round(STRIDE * rate))
     lost = np.concatenate([[0], np.cumsum(~np.isfinite(points + turns[:, 0]).all(axis=1))])
@@ -125,7 +129,7 @@ def fit_pivot(
     n, degree = len(points), round(len(points) / (DRIFT * rate))
     mean = Rotation.from_matrix(rotations).mean().as_matrix()
     phi = Rotation.from_matrix(rotations @ mean.T).as_rotvec()
-    if np.sqrt(np.linalg.eigvalsh(np.cov(phi.T))[1]) < WIDE:
+    if np.linalg.eigvalsh(np.cov(phi.T))[1] < WIDE**2:
         return None
     points = points - _bend(phi, mean, rest)
     basis, prior = _bone_basis(None if axis is None else mean @ axis, rest)
@@ -147,11 +151,7 @@ def fit_pivot(
     noise = 0.002
     for _ in range(3):
         information = matrix.T @ matrix / noise**2 + np.diag(weak)
-        try:
-            factor = cho_factor(information)
-        except LinAlgError:
-            return None
-        solution = cho_solve(factor, matrix.T @ right / noise**2)
+        solution = np.linalg.solve(information, matrix.T @ right / noise**2)
         left = (right - matrix @ solution).reshape(n, 3)
         white = np.sqrt(np.sum(left**2) / (3 * (n - degree - 4)))
         noise = max(white, FLOOR_NOISE) * np.sqrt(_correlated(left))

@@ -79,7 +79,7 @@ class Tracks:
 
 
 def _nearest_rotations(turns: Array) -> Array:
-    known = np.isfinite(turns).all(axis=(-2, -1))
+    known = np.asarray(np.isfinite(turns).all(axis=(-2, -1)))
     filled = np.where(known[..., None, None], turns, np.eye(3))
     nearest = Rotation.from_matrix(filled.reshape(-1, 3, 3)).as_matrix().reshape(turns.shape)
     return np.where(known[..., None, None], nearest, np.nan)

@@ -1,8 +1,9 @@
 """The movement that calibration asks of a person, as an honest person would do it: not exactly.
 
-Stand still; circle both hands, elbows at the waist, and turn the head; lift each straight leg outwards and circle its foot; bow and sway on
-straight legs. Forearms, shanks and chest are meant to be still meanwhile, and are not: they give way by a
-share of what hands, feet and head do, and wander. Joint angles are authored, so the truth is known.
+Stand still; circle both hands, elbows at the waist, and turn the head; lift each straight leg outwards and
+circle its foot; bow and sway on straight legs. Forearms, shanks and chest are meant to be still meanwhile.
+They are not: they give way by a share of what hands, feet and head do, and wander. Joint angles are
+authored, so the truth is known.
 """
 
 from __future__ import annotations
@@ -58,8 +59,10 @@ def range_of_motion(figure: Figure, seed: int = 0, *, sloppy: float = 0.05, rate
         swing[:, :2] += give[:, [2, 0]] * (lifted[0] + lifted[1])[:, None]
         hip = roles.hip[side]
         turned[:, hip] = rot.mul(turned[:, hip], rot.from_euler("ZXY", swing))
-        bend = np.radians(rng.uniform(1.0, 7.0) + rng.uniform(0.0, 1.0) * np.sin(2.5 * t + rng.uniform(0, 6.3)))
-        turned[:, roles.knee[side]] = rot.from_axis_angle(X, bend)
+        bend = np.radians(
+            rng.uniform(1.0, 7.0) + rng.uniform(0.0, 1.0) * np.sin(2.5 * t + rng.uniform(0, 6.3))
+        )
+        turned[:, roles.knee[side]] = rot.from_axis_angle(X, np.radians(bend))
         turned[:, roles.ankle[side]] = rot.from_euler("YXZ", circles)
     return _planted(figure, turned, lifted, rate)
 
@@ -71,7 +74,10 @@ def _bump(t: Array, start: float, duration: float, ease: float = 0.35) -> Array:
 
 def _circles(t: Array, during: Array, widths: tuple[float, float, float], rng: np.random.Generator) -> Array:
     """Angles (F, 3) about Y, X and Z [rad] of circles with changing axes; amplitudes in degrees."""
-    speed, phase = rng.uniform(0.8, 1.2, 3) * [0.7, 1.0, 1.0], rng.uniform(0, 2 * np.pi)
+    speed = rng.uniform(0.85, 1.15) * np.array([0.7, 1.0, rng.uniform(0.95, 1.05)])
+    phase = (
+        0.0 if not during.any() else -2 * np.pi * speed * t[np.argmax(during > 0)] + rng.uniform(0, 2 * np.pi)
+    )
     lag = np.array([rng.uniform(0, 2 * np.pi), 0.0, np.pi / 2])
     waves = np.sin(2 * np.pi * speed * t[:, None] + phase + lag)
     return np.asarray(np.radians(widths) * rng.uniform(0.9, 1.1, 3) * waves * during[:, None])
@@ -85,7 +91,7 @@ def _give(circles: Array, rng: np.random.Generator) -> Array:
 def _wander(t: Array, rng: np.random.Generator) -> Array:
     """Slow independent movement (F, 3) [rad] of 20 degrees, to be scaled; none while standing still."""
     waves = np.sin(2 * np.pi * rng.uniform(0.2, 0.6, 3) * t[:, None] + rng.uniform(0, 2 * np.pi, 3))
-    return np.radians(20.0) * waves * smooth_step((t - STAND) / 0.5)[:, None]
+    return np.asarray(np.radians(20.0) * waves * smooth_step((t - STAND) / 0.5)[:, None])
 
 
 def _bow(figure: Figure, turned: Array, during: Array, t: Array, rng: np.random.Generator) -> None:
@@ -130,8 +136,10 @@ def _planted(figure: Figure, turned: Array, lifted: list[Array], rate: float) ->
         for joint in figure.skeleton.path(pelvis, roles.ankle[side])[1:]:
             at = at + rot.mul_vec(world, figure.offsets[joint])
             if joint == roles.ankle[side]:
-                turned[:, joint] = rot.mul(rot.inv(world) if not lifted[side].any() else _level(
-                    world, lifted[side]), turned[:, joint])
+                turned[:, joint] = rot.mul(
+                    rot.inv(world) if not lifted[side].any() else _level(world, lifted[side]),
+                    turned[:, joint],
+                )
             world = rot.mul(world, turned[:, joint])
         weight = (weights[side] / (weights[0] + weights[1]))[:, None]
         place += weight * (standing[roles.ankle[side]] - at)

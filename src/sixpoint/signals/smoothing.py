@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import convolve1d
 
 Array = NDArray[np.float64]
 
@@ -31,8 +30,15 @@ def smooth(values: ArrayLike, rate: float, width: float) -> Array:
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(width * rate, 1e-9)) ** 2)
     bell /= bell.sum()
     known = np.isfinite(flat)
-    weight = convolve1d(known.astype(float), bell, axis=0, mode="constant")
-    total = convolve1d(np.where(known, flat, 0.0), bell, axis=0, mode="constant")
-    edge = convolve1d(np.ones(len(flat)), bell, mode="constant")[:, None]  # the clip's ends are no gaps
+    weight = _filtered(known.astype(float), bell)
+    total = _filtered(np.where(known, flat, 0.0), bell)
+    edge = _filtered(np.ones((len(flat), 1)), bell)  # the clip's ends are no gaps
     enough = weight >= 0.5 * edge
     return np.where(enough, total / np.where(enough, weight, 1.0), np.nan).reshape(values.shape)
+
+
+def _filtered(values: Array, bell: Array) -> Array:
+    """Convolve each column of (F, n) with a symmetric bell; zeros beyond the ends."""
+    reach = len(bell) // 2
+    padded = np.pad(values, ((reach, reach), (0, 0)))
+    return sum((w * padded[k : k + len(values)] for k, w in enumerate(bell)), np.zeros_like(values))

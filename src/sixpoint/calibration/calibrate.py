@@ -1,26 +1,27 @@
-"""Calibrate six trackers: mounts and lengths, and what could not be found."""
+"""Calibrate six trackers: from their frames to mounts and lengths."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.estimate import Estimate
 from sixpoint.calibration.legs import LegFit, fit_legs
 from sixpoint.calibration.lengths import compute_stature, measure_lengths
 from sixpoint.calibration.model import Body
+from sixpoint.calibration.mounts import Calibration, Mount
 from sixpoint.calibration.pivots import find_pivots
 from sixpoint.calibration.standing import UP, Posture, Standing, compute_heading, find_standing
 from sixpoint.calibration.tracks import Tracks
 from sixpoint.errors import TargetError
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+
 
 GOOD = 0.01  # an offset that is known to this standard deviation is observed [m]
 USELESS = 0.05  # one that is known less well than this is not handed out [m]
@@ -33,64 +34,6 @@ MOVES = {
     4: "lift the straight leg, hold it and circle the foot widely",
     5: "lift the straight leg, hold it and circle the foot widely",
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Mount:
-    """How a tracker sits on its segment.
-
-    Attributes:
-        offset: (3,) from the joint to the tracker in the tracker's frame [m]; NaN where it was not found.
-        rotation: (4,) segment<-tracker; NaN where it was not found.
-        std: Largest standard deviation of the offset in any direction [m].
-        rotation_std: Of the rotation, which is how exactly the pose was held [rad].
-    """
-
-    offset: Array
-    rotation: Array
-    std: float = float("inf")
-    rotation_std: float = float("inf")
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """What a recording tells about a person and six trackers.
-
-    Attributes:
-        stature: [m].
-        segments: Segment lengths by name [m], as for ``Figure.from_segments``; empty with a given figure.
-        sources: Where each comes from.
-        mounts: Effector -> how its tracker is mounted.
-        unobserved: What the data does not tell -> why, and what would.
-        given: The figure that was given.
-    """
-
-    stature: float
-    segments: dict[str, float]
-    sources: dict[str, str]
-    mounts: dict[str, Mount]
-    unobserved: dict[str, str] = field(default_factory=dict)
-    given: Figure | None = None
-
-    def figure(self) -> Figure:
-        """The figure that was given, or the built-in one with the lengths found."""
-        return self.given if self.given is not None else Figure.from_segments(**self.segments)
-
-    def apply(self, targets: Targets) -> Targets:
-        """Trackers -> joint positions and segment rotations.
-
-        A point whose offset was not found is lost (NaN), a rotation whose mount was not found has none:
-        give them a mount of your own with ``dataclasses.replace`` if you know better. Targets without
-        rotations are taken as joints already.
-        """
-        if targets.rotations is None:
-            return targets
-        offsets = np.array([self.mounts[name].offset for name in EFFECTORS])
-        mounts = np.array([self.mounts[name].rotation for name in EFFECTORS])
-        turned = rot.normalised(targets.rotations)
-        turned = np.where(np.isfinite(targets.rotations).all(axis=-1, keepdims=True), turned, np.nan)
-        positions = targets.positions - rot.mul_vec(turned, offsets)
-        return Targets(positions, targets.rate, rot.mul(turned, rot.inv(mounts)), targets.name)
 
 
 def calibrate(
@@ -117,40 +60,62 @@ def calibrate(
     standing = find_standing(tracks, posture)
     if standing is None and figure is None:
         raise TargetError(
-            "no still standing pose found: stand upright and still for two seconds with all six trackers seen, "
-            "arms hanging or stretched to the sides (or give a figure, if only mounts are sought)"
+            "no still standing pose found: stand upright and still for two seconds with all six trackers "
+            "seen, arms hanging or stretched to the sides (or give a figure, if only mounts are sought)"
         )
     if targets.rotations is None:
         return _joints_only(tracks, standing, figure, stature)
-    body, own = _prior_body(standing, figure, stature)
+    body = _prior_body(standing, figure, stature)
     mounts = np.full((6, 3, 3), np.nan) if standing is None else standing.mounts
     estimates = _pivots(tracks, standing, mounts, body)
     legs: LegFit | None = None
     if standing is not None:
         estimates = _with_heights(estimates, standing, body, floor)
-        standing = _with_heading(standing, estimates)
+        standing = replace(standing, heading=compute_heading(_standing_joints(standing, estimates)))
         mounts = standing.mounts
         if figure is None and stature is None and estimates[1].std < USELESS:
-            body = Body.from_stature(_stature(standing, estimates), found=True)
+            joints = _standing_joints(standing, estimates)
+            body = Body.from_stature(compute_stature(joints[1, 1] - joints[4:, 1].mean()), found=True)
         if np.isfinite(mounts[0]).all() and max(estimates[4].std, estimates[5].std) < USELESS:
             legs = fit_legs(tracks, standing, mounts[0], (estimates[4], estimates[5]), body)
     if legs is not None:
         estimates = [legs.pelvis, *estimates[1:4], *legs.ankles]
     found = {name: _mount(e, m) for name, e, m in zip(EFFECTORS, estimates, mounts, strict=True)}
-    unobserved = _unobserved(found, standing, targets)
+    unobserved = _unobserved(found, standing)
     if figure is not None:
         return Calibration(body.stature, {}, {}, found, unobserved, figure)
+    return _with_lengths(tracks, standing, found, unobserved, stature, legs)
+
+
+def _with_lengths(
+    tracks: Tracks,
+    standing: Standing | None,
+    found: dict[str, Mount],
+    unobserved: dict[str, str],
+    stature: float | None,
+    legs: LegFit | None,
+) -> Calibration:
+    """Measure lengths between the joints, as far as the offsets are known."""
     assert standing is not None
     offsets = np.array([found[name].offset for name in EFFECTORS])
-    unknown = [n for n, o in zip(EFFECTORS, offsets, strict=True) if n not in ("l_wrist", "r_wrist") and np.isnan(o).any()]
-    joints = standing.positions - np.einsum("kij,kj->ki", standing.turns, np.where(np.isnan(offsets), 0.0, offsets))
+    missing = np.isnan(offsets).any(axis=1)
+    unknown = [name for name, gone in zip(EFFECTORS, missing, strict=True) if gone]
     if unknown:
-        unobserved["lengths"] = f"the offsets of {', '.join(unknown)} go into them and are not known"
-    joints[2:4][np.isnan(offsets[2:4]).any(axis=1)] = np.nan
+        unobserved = unobserved | {
+            "lengths": f"offsets of {', '.join(unknown)} are unknown: their trackers stand in for the joints"
+        }
+    filled = np.where(missing[:, None], 0.0, offsets)
+    joints = standing.positions - np.einsum("kij,kj->ki", _filled(standing.turns), filled)
+    joints[2:4][missing[2:4]] = np.nan  # arms are rather proportions
     moved = tracks.joints(offsets)
     span = _largest(np.linalg.norm(moved[:, 2] - moved[:, 3], axis=1))
     lengths = measure_lengths(joints, standing.posture, span, stature, None if legs is None else legs.length)
     return Calibration(lengths.stature, lengths.segments, lengths.sources, found, unobserved)
+
+
+def _filled(turns: Array) -> Array:
+    """Rotations with zeros where they are unknown."""
+    return np.where(np.isfinite(turns), turns, 0.0)
 
 
 def _joints_only(
@@ -172,14 +137,15 @@ def _largest(values: Array) -> float:
     return float(known.max()) if len(known) else float("nan")
 
 
-def _prior_body(standing: Standing | None, figure: Figure | None, stature: float | None) -> tuple[Body, bool]:
+def _prior_body(standing: Standing | None, figure: Figure | None, stature: float | None) -> Body:
+    """What is known before anything is measured."""
     if figure is not None:
-        return Body.from_figure(figure), True
+        return Body.from_figure(figure)
     if stature is not None:
-        return Body.from_stature(stature, found=False), True
+        return Body.from_stature(stature, found=False)
     assert standing is not None
     height = float(standing.positions[1, 1] - standing.positions[4:, 1].mean()) / (HEAD_RATIO - 0.04)
-    return Body.from_stature(float(np.clip(height, 0.4, 2.8)), found=True), False
+    return Body.from_stature(float(np.clip(height, 0.4, 2.8)), found=True)
 
 
 def _pivots(tracks: Tracks, standing: Standing | None, mounts: Array, body: Body) -> list[Estimate]:
@@ -193,7 +159,7 @@ def _pivots(tracks: Tracks, standing: Standing | None, mounts: Array, body: Body
 
 
 def _ground(tracks: Tracks, standing: Standing | None, k: int) -> tuple[Array, Array]:
-    """Position and rotation of a foot tracker while the foot stands: in the still pose, else where it is lowest."""
+    """Position and rotation of a foot tracker while its foot stands: in the still pose, else lowest."""
     if standing is not None:
         return standing.positions[k], standing.turns[k]
     height = np.where(np.isfinite(tracks.turns[:, k]).all(axis=(1, 2)), tracks.positions[:, k, 1], np.inf)
@@ -225,19 +191,11 @@ def _known(estimates: list[Estimate]) -> Array:
     return np.array([e.offset if e.std < USELESS else np.zeros(3) for e in estimates])
 
 
-def _with_heading(standing: Standing, estimates: list[Estimate]) -> Standing:
-    """The standing pose with the heading of its joints instead of that of its trackers."""
-    turns = np.where(np.isfinite(standing.turns), standing.turns, 0.0)
-    joints = standing.positions - np.einsum("kij,kj->ki", turns, _known(estimates))
-    return Standing(
-        standing.frames, standing.posture, standing.positions, standing.turns, compute_heading(joints)
+def _standing_joints(standing: Standing, estimates: list[Estimate]) -> Array:
+    """(6, 3) joints in the still pose [m], trackers where an offset is not known."""
+    return np.asarray(
+        standing.positions - np.einsum("kij,kj->ki", _filled(standing.turns), _known(estimates))
     )
-
-
-def _stature(standing: Standing, estimates: list[Estimate]) -> float:
-    turns = np.where(np.isfinite(standing.turns), standing.turns, 0.0)
-    joints = standing.positions - np.einsum("kij,kj->ki", turns, _known(estimates))
-    return compute_stature(float(joints[1, 1] - joints[4:, 1].mean()))
 
 
 def _mount(estimate: Estimate, mount: Array) -> Mount:
@@ -252,7 +210,7 @@ def _mount(estimate: Estimate, mount: Array) -> Mount:
     )
 
 
-def _unobserved(mounts: dict[str, Mount], standing: Standing | None, targets: Targets) -> dict[str, str]:
+def _unobserved(mounts: dict[str, Mount], standing: Standing | None) -> dict[str, str]:
     out = {}
     for k, (name, mount) in enumerate(mounts.items()):
         if mount.std > GOOD:
