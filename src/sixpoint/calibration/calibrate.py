@@ -28,7 +28,7 @@ USELESS = 0.05  # one that is known less well than this is not handed out [m]
 POSTURE_STD = np.radians(5.0)  # how exactly a person holds a pose [rad]
 HEAD_RATIO = 0.91  # height of a head tracker over the stature, roughly
 MOVES = {
-    1: "nod, shake and tilt the head with the chest still",
+    1: "nod, shake and tilt the head with the chest still, and give a figure, for where necks turn differs",
     2: "circle the hand with the elbow at the waist",
     3: "circle the hand with the elbow at the waist",
     4: "lift the straight leg, hold it and circle the foot widely",
@@ -155,6 +155,7 @@ def _pivots(tracks: Tracks, standing: Standing | None, mounts: Array, body: Body
         ground = _ground(tracks, standing, k) if k >= 4 else None
         points, turns = tracks.positions[:, k], tracks.turns[:, k]
         estimates.append(find_pivots(points, turns, tracks.rotations[:, k], tracks.rate, axis, rest, ground))
+    estimates[1] = estimates[1].blurred(body.neck_std)
     return estimates
 
 
@@ -215,7 +216,9 @@ def _unobserved(mounts: dict[str, Mount], standing: Standing | None) -> dict[str
     for k, (name, mount) in enumerate(mounts.items()):
         if mount.std > GOOD:
             known = f"known to {100 * mount.std:.1f} cm only" if mount.std < USELESS else "not found"
-            move = MOVES.get(k, "bow and sway on straight legs, after circling both feet")
+            move = MOVES.get(
+                k, "circle both feet, bow and sway on straight legs, and give a figure, for hips differ"
+            )
             out[f"{name} offset"] = f"{known}: {move}"
         if not np.isfinite(mount.rotation_std):
             why = "no still standing pose" if standing is None else "no rotations in the still standing pose"

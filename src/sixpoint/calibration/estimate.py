@@ -28,6 +28,12 @@ class Estimate:
         least = float(np.linalg.eigvalsh(self.information)[0])
         return least**-0.5 if least > 1e-3 else float("inf")
 
+    def blurred(self, std: float) -> Estimate:
+        """The same with an independent error of a standard deviation in every direction [m]."""
+        values, vectors = np.linalg.eigh(self.information)
+        values = np.maximum(values, 0.0)
+        return Estimate(self.offset, (vectors * (values / (1.0 + values * std**2))) @ vectors.T)
+
     @classmethod
     def nothing(cls) -> Estimate:
         """No knowledge at all."""

@@ -97,12 +97,11 @@ def fit_legs(
         matrix = np.concatenate(rows)
         x = x + np.linalg.lstsq(matrix, np.concatenate(right), rcond=None)[0]
     covariance: Array = np.asarray(np.linalg.inv(matrix.T @ matrix), float)
-    vague = covariance[:3, :3] + body.hip_std**2 * np.eye(3)
     feet = [
         Estimate(x[s], np.asarray(np.linalg.inv(covariance[s, s]), float)) for s in (slice(3, 6), slice(6, 9))
     ]
     return LegFit(
-        Estimate(x[:3], np.asarray(np.linalg.inv(vague), float)),
+        Estimate(x[:3], np.asarray(np.linalg.inv(covariance[:3, :3]), float)).blurred(body.hip_std),
         (feet[0], feet[1]),
         float(legs.mean() + x[9:].mean()),
         float(np.sqrt(covariance[9:, 9:].mean())),

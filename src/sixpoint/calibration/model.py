@@ -35,6 +35,7 @@ class Body:
         height_std: (3,) standard deviations of the standing heights of head, wrists and ankles [m].
         leg_std: Of the length of a leg, hip to ankle [m].
         hip_std: Of where the hips are in the pelvis [m].
+        neck_std: Of where a neck turns under the head joint [m].
     """
 
     figure: Figure
@@ -42,19 +43,20 @@ class Body:
     height_std: tuple[float, float, float]
     leg_std: float
     hip_std: float
+    neck_std: float
 
     @classmethod
     def from_figure(cls, figure: Figure) -> Body:
         """A person whose lengths are known."""
         mean = Figure.from_stature(1.75)
         stature = 1.75 * figure.height / mean.height
-        return cls(figure, stature, STD_GIVEN, 0.004, 0.004)
+        return cls(figure, stature, STD_GIVEN, 0.004, 0.004, 0.002)
 
     @classmethod
     def from_stature(cls, stature: float, found: bool) -> Body:
         """A person of average proportions; ``found`` where the stature comes from this recording."""
         std = STD_FOUND if found else STD_STATURE
-        return cls(Figure.from_stature(stature), stature, std, 0.025, 0.008)
+        return cls(Figure.from_stature(stature), stature, std, 0.025, 0.008, 0.03)
 
     def heights(self, posture: Posture) -> Array:
         """(6,) heights of the effectors over the floor, standing [m]."""

@@ -38,6 +38,7 @@ RESTLESS = 0.0025  # a joint whose unexplained movement is larger does not rest 
 FLOOR_NOISE = 0.0005  # least residual that is believed [m]
 LIFTED = 0.04  # height of a lifted foot's joint over where it stands [m]
 AGREED = 12.0  # chi square (3 terms) between windows that tell of the same joint
+PAIRS = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # products of components, the same in every frame
 GIVEN_WAY = 45.0  # chi square of B / prior (27 terms) beyond which the joint did not rest
 
 
@@ -104,7 +105,7 @@ def _lifted(points: Array, turns: Array, offset: Array, ground: tuple[Array, Arr
 
 
 def _agreed(found: list[tuple[int, int, Estimate]]) -> Estimate:
-    """Fuse windows that do not overlap, of those that agree with the one that most agree with."""
+    """Fuse the windows that agree with the one that most agree with; overlapping ones count once."""
     if not found:
         return Estimate.nothing()
     offsets = np.array([e.offset for *_, e in found])
@@ -114,12 +115,13 @@ def _agreed(found: list[tuple[int, int, Estimate]]) -> Estimate:
     distance = np.einsum("abi,abij,abj->ab", apart, both, apart)
     weight = 1.0 / np.trace(covariances, axis1=1, axis2=2)
     best = int(np.argmax(np.exp(-0.5 * distance) @ weight * weight))
-    order = sorted(np.flatnonzero(distance[best] < AGREED), key=lambda k: found[k][2].std)
-    chosen: list[tuple[int, int, Estimate]] = []
-    for start, end, estimate in (found[k] for k in order):
-        if all(start >= other_end or end <= other for other, other_end, _ in chosen):
-            chosen.append((start, end, estimate))
-    return Estimate.fuse([estimate for *_, estimate in chosen])
+    chosen = [found[k] for k in np.flatnonzero(distance[best] < AGREED)]
+    covered = np.zeros(max(end for _, end, _ in chosen), bool)
+    for start, end, _ in chosen:
+        covered[start:end] = True
+    repeated = sum(end - start for start, end, _ in chosen) / covered.sum()
+    fused = Estimate.fuse([estimate for *_, estimate in chosen])
+    return Estimate(fused.offset, fused.information / repeated)
 
 
 def fit_pivot(
@@ -139,7 +141,7 @@ def fit_pivot(
     def without_drift(a: Array) -> Array:
         return np.asarray(a - np.einsum("nd,md,m...->n...", drift, drift, a))
 
-    pairs = phi[:, [0, 1, 2, 0, 0, 1]] * phi[:, [0, 1, 2, 1, 2, 2]]
+    pairs = phi[:, [0, 1, 2, 0, 0, 1]] * phi[:, [0, 1, 2, 1, 2, 2]] * PAIRS
     given = without_drift(np.column_stack([phi, pairs]))
     columns = np.concatenate([without_drift(basis @ turns), np.zeros((n, 3, 27))], axis=2)
     for k in range(3):
