@@ -50,7 +50,7 @@ class Body:
         """A person whose lengths are known."""
         mean = Figure.from_stature(1.75)
         stature = 1.75 * figure.height / mean.height
-        return cls(figure, stature, STD_GIVEN, 0.004, 0.004, 0.002)
+        return cls(figure, stature, STD_GIVEN, 0.004, 0.004, 0.008)
 
     @classmethod
     def from_stature(cls, stature: float, found: bool) -> Body:

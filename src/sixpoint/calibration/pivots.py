@@ -30,10 +30,11 @@ from sixpoint.calibration.estimate import Estimate
 Array = NDArray[np.float64]
 
 WINDOWS, STRIDE = (1.6, 2.3), 0.2  # of the windows looked at [s]
+LEAST = 1.8  # time that windows which agree have to cover together [s]
 DRIFT = 0.5  # time per power of the polynomial that the joint drifts by [s]
 CURVED = 0.4  # of the share: how far giving way is not proportional
 WIDE = np.radians(9.0)  # least standard deviation of the second widest component of the rotation [rad]
-LONGEST = 0.2  # a tracker is not farther from its joint [m]
+LONGEST = 0.16  # a tracker is not farther from its joint [m]
 RESTLESS = 0.0025  # a joint whose unexplained movement is larger does not rest [m]
 FLOOR_NOISE = 0.0005  # least residual that is believed [m]
 LIFTED = 0.04  # height of a lifted foot's joint over where it stands [m]
@@ -93,7 +94,7 @@ def find_pivots(
                 estimate = fit_pivot(points[window], turns[window], rotations[window], rate, axis, rest)
                 if estimate is not None and _lifted(points[window], turns[window], estimate.offset, ground):
                     found.append((start, end, estimate))
-    return _agreed(found)
+    return _agreed(found, round(LEAST * rate))
 
 
 def _lifted(points: Array, turns: Array, offset: Array, ground: tuple[Array, Array] | None) -> bool:
@@ -104,8 +105,11 @@ def _lifted(points: Array, turns: Array, offset: Array, ground: tuple[Array, Arr
     return bool(height > LIFTED)
 
 
-def _agreed(found: list[tuple[int, int, Estimate]]) -> Estimate:
-    """Fuse the windows that agree with the one that most agree with; overlapping ones count once."""
+def _agreed(found: list[tuple[int, int, Estimate]], least: int) -> Estimate:
+    """Fuse the windows that agree with the one that most agree with; overlapping ones count once.
+
+    Nothing where they cover fewer than ``least`` frames: one window may look like a pivot by chance.
+    """
     if not found:
         return Estimate.nothing()
     offsets = np.array([e.offset for *_, e in found])
@@ -119,6 +123,8 @@ def _agreed(found: list[tuple[int, int, Estimate]]) -> Estimate:
     covered = np.zeros(max(end for _, end, _ in chosen), bool)
     for start, end, _ in chosen:
         covered[start:end] = True
+    if covered.sum() < least:
+        return Estimate.nothing()
     repeated = sum(end - start for start, end, _ in chosen) / covered.sum()
     fused = Estimate.fuse([estimate for *_, estimate in chosen])
     return Estimate(fused.offset, fused.information / repeated)
