@@ -98,6 +98,22 @@ def test_mount_rotations_come_from_the_pose():
         assert np.linalg.norm(wrong[[0, 2]]) < np.radians(0.6)  # tilt
 
 
+def test_a_t_pose_turns_the_hands_by_a_quarter():
+    """In a T-pose, facing anywhere, all mount rotations differ by the same small error of heading."""
+    figure = sp.Figure.from_stature(STATURE)
+    turned = np.tile([0.0, 0.0, 0.0, 1.0], (120, len(figure.skeleton), 1))
+    for joint, angle in zip(figure.roles.shoulder, (np.pi / 2, -np.pi / 2), strict=True):
+        turned[:, joint] = Rotation.from_euler("z", angle).as_quat()
+    turned[:, figure.roles.pelvis] = Rotation.from_euler("y", 0.8).as_quat()
+    motion = figure.compute_motion(turned, np.zeros((120, 3)), 60.0)
+    targets, _, mounts = track(figure.targets(motion), 3, noise=0.0)
+    found = sp.calibrate(targets, figure)
+    rotations = [Rotation.from_quat(found.mounts[name].rotation) for name in sp.EFFECTORS]
+    wrong = [(one * mounts[k].inv()).magnitude() for k, one in enumerate(rotations)]
+    assert max(wrong) < np.radians(6)  # offsets of 12 cm turn the line from wrist to wrist
+    assert_allclose(wrong, wrong[0], atol=1e-6)
+
+
 def test_applying_a_calibration_gives_the_joints():
     """Trackers go in, joints and segment rotations come out, frame by frame."""
     figure, joints = movement(1)

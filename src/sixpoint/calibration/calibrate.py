@@ -28,7 +28,8 @@ USELESS = 0.05  # one that is known less well than this is not handed out [m]
 POSTURE_STD = np.radians(5.0)  # how exactly a person holds a pose [rad]
 HEAD_RATIO = 0.91  # height of a head tracker over the stature, roughly
 MOVES = {
-    1: "nod, shake and tilt the head with the chest still, and give a figure, for where necks turn differs",
+    0: "circle both feet, bow and sway on straight legs",
+    1: "nod, shake and tilt the head with the chest still",
     2: "circle the hand with the elbow at the waist",
     3: "circle the hand with the elbow at the waist",
     4: "lift the straight leg, hold it and circle the foot widely",
@@ -81,7 +82,7 @@ def calibrate(
     if legs is not None:
         estimates = [legs.pelvis, *estimates[1:4], *legs.ankles]
     found = {name: _mount(e, m) for name, e, m in zip(EFFECTORS, estimates, mounts, strict=True)}
-    unobserved = _unobserved(found, standing)
+    unobserved = _unobserved(found, standing, figure)
     if figure is not None:
         return Calibration(body.stature, {}, {}, found, unobserved, figure)
     return _with_lengths(tracks, standing, found, unobserved, stature, legs)
@@ -211,14 +212,12 @@ def _mount(estimate: Estimate, mount: Array) -> Mount:
     )
 
 
-def _unobserved(mounts: dict[str, Mount], standing: Standing | None) -> dict[str, str]:
+def _unobserved(mounts: dict[str, Mount], standing: Standing | None, figure: Figure | None) -> dict[str, str]:
     out = {}
     for k, (name, mount) in enumerate(mounts.items()):
         if mount.std > GOOD:
             known = f"known to {100 * mount.std:.1f} cm only" if mount.std < USELESS else "not found"
-            move = MOVES.get(
-                k, "circle both feet, bow and sway on straight legs, and give a figure, for hips differ"
-            )
+            move = MOVES.get(k, MOVES[0])
             out[f"{name} offset"] = f"{known}: {move}"
         if not np.isfinite(mount.rotation_std):
             why = "no still standing pose" if standing is None else "no rotations in the still standing pose"
