@@ -217,8 +217,8 @@ def _unobserved(mounts: dict[str, Mount], standing: Standing | None, figure: Fig
     for k, (name, mount) in enumerate(mounts.items()):
         if mount.std > GOOD:
             known = f"known to {100 * mount.std:.1f} cm only" if mount.std < USELESS else "not found"
-            move = MOVES.get(k, MOVES[0])
-            out[f"{name} offset"] = f"{known}: {move}"
+            needs = ", and give a figure, as necks and hips differ" if figure is None and k < 2 else ""
+            out[f"{name} offset"] = f"{known}: {MOVES[k]}{needs}"
         if not np.isfinite(mount.rotation_std):
             why = "no still standing pose" if standing is None else "no rotations in the still standing pose"
             out[f"{name} rotation"] = f"{why}: stand still for two seconds, arms hanging or stretched"
