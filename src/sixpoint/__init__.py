@@ -16,6 +16,8 @@ from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.calibration.calibrate import calibrate
+from sixpoint.calibration.mounts import Calibration, Mount
 from sixpoint.errors import FigureError, FormatError, SixpointError, SkeletonError, TargetError
 from sixpoint.formats import load, load_targets, save, save_targets
 from sixpoint.samples import SAMPLES, make_sample
@@ -63,6 +65,7 @@ __all__ = [
     "BalanceTask",
     "Ball",
     "Box",
+    "Calibration",
     "Capsule",
     "CouplingTask",
     "CyclicCoordinateDescent",
@@ -83,6 +86,7 @@ __all__ = [
     "LookAtTask",
     "Motion",
     "MotionSolution",
+    "Mount",
     "ObstacleTask",
     "OrientationTask",
     "PlaneTask",
@@ -104,6 +108,7 @@ __all__ = [
     "TGBSequentialIK",
     "TargetError",
     "Targets",
+    "calibrate",
     "compute_errors",
     "load",
     "load_targets",
