@@ -58,8 +58,9 @@ DAMPED = Promise(0.016, 1.0, 0.0215, neutral=0.0055, stretched=0.3, settled=200,
 PROMISES = {
     "sik": Promise(),
     # The trunk is closed to 0.1 micrometres; pelvis and swivel angles turn at a bounded speed.
-    "sik+": Promise(
-        rest=0.038, free=0.046, neutral=1e-7, settled=60, scaled=2.5e-4, others=1e-7, upright=True
+    "sik+": Promise(rest=0.038, free=0.046, neutral=1e-7, settled=60, scaled=3e-3, others=1e-7, upright=True),
+    "sik-prior": Promise(
+        rest=0.05, free=0.05, neutral=1e-4, scaled=0.01, others=1e-7, settled=60, upright=True
     ),
     "tgbsik": Promise(),
     # Rest: CCD, which bends the spine of both from the head, turns its last joint by 36 degrees with limits

@@ -15,7 +15,7 @@ from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
 from sixpoint.solvers.sequential_plus.measured import is_measured, lean_to_head, pole_of_end, turn_end
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
-from sixpoint.solvers.sequential_plus.pelvis import estimate_pelvis
+from sixpoint.solvers.sequential_plus.pelvis import estimate_pelvis, lean_to_ankles
 from sixpoint.solvers.sequential_plus.trunk import bend_spine, close_trunk, twist_to_wrists
 from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, judge, write_frame
 from sixpoint.solvers.six_points.packing import end_row, limb_row, unpack_model
@@ -63,7 +63,8 @@ def start_trunk(model, s, filled, turned, local, memory, world, segs):
     """Pelvis and spine before the spine closes on the head; returns the pelvis' X and the chord's unit."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
-    qt.store(local, 0, qt.from_axes(x, y, vec.cross(x, y)))
+    plain = qt.from_axes(x, y, vec.cross(x, y))
+    qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, plain))
     twist_share, bend_share = s.twist_share, s.bend_share
     if is_measured(turned, 0):
         qt.store(local, 0, qt.load(turned, 0))

@@ -15,6 +15,9 @@ from sixpoint.kernels.jit import helper
 UP = (0.0, 1.0, 0.0)
 CHEST = 0.75  # height of the chest's point between pelvis and head
 TOLD = 0.02  # m, lines that tell less than this tell nothing
+LEANS = 5  # rounds at most
+LEAN = 0.1  # rad, largest turn in a round
+YIELDING = 1e-4  # m^2, a shorter lever turns less than it would need to
 RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 
 
@@ -103,3 +106,29 @@ def estimate_pelvis(filled, memory, s):
     if began:
         x = turn_at_most(vec.unit(vec.reject(vec.load(memory, 0), y)), x, y, s.turn_speed * s.dt)
     return x, y, chord
+
+
+@helper
+def lean_to_ankles(filled, hips, limbs, q):
+    """Turn the pelvis by the least angles that bring the hips within a leg's length of known ankles."""
+    pelvis = vec.load(filled, 0)
+    for _ in range(LEANS):
+        near = True
+        for k in range(2):
+            if filled[4 + k, 3] == 0.0:
+                continue
+            hip = qt.mul_vec(q, vec.load(hips, k))
+            leg = vec.sub(vec.sub(vec.load(filled, 4 + k), pelvis), hip)
+            beyond = vec.norm(leg) - (limbs[2 + k, 0] + limbs[2 + k, 1])
+            if beyond <= 0.0:
+                continue
+            near = False
+            lever = vec.cross(hip, vec.unit(leg))
+            turn = vec.scale(beyond / (vec.dot(lever, lever) + YIELDING), lever)
+            size = vec.norm(turn)
+            if size > LEAN:
+                turn = vec.scale(LEAN / size, turn)
+            q = qt.mul(qt.exp(turn), q)
+        if near:
+            break
+    return qt.normalised(q)

@@ -13,6 +13,7 @@ from sixpoint.solvers.sequential_plus.pelvis import UP
 from sixpoint.solvers.sequential_prior.packing import END, LIMB, MASKS, POINTS, TURNED
 
 SHORT = 1e-6  # m
+FIRST_END = 10  # row of the memory with the left wrist
 
 
 @helper
@@ -22,19 +23,38 @@ def put(features, at, v):
 
 
 @helper
-def see_points(facts, filled, frame, told, velocity, mean, features):
-    """Features of the points, seen in ``frame``; those of lost points are what is usual."""
+def recall_ends(facts, mean, pelvis_turn, memory, filled):
+    """Put lost wrists and ankles where they were last, seen from the pelvis; at first where usual."""
+    pelvis = vec.load(filled, 0)
+    for i in range(2, 6):
+        if filled[i, 3] > 0.0:
+            continue
+        seen, at = FIRST_END + i - 2, 3 * (i - 1)
+        away = vec.load(memory, seen)
+        if memory[seen, 3] == 0.0:
+            away = vec.scale(facts.height, (mean[at], mean[at + 1], mean[at + 2]))
+        vec.store(filled, i, vec.add(pelvis, qt.mul_vec(pelvis_turn, away)))
+
+
+@helper
+def remember_ends(pelvis_turn, filled, memory):
+    """Note where wrists and ankles are, seen from the pelvis."""
+    for i in range(2, 6):
+        if filled[i, 3] > 0.0:
+            away = vec.sub(vec.load(filled, i), vec.load(filled, 0))
+            vec.store(memory, FIRST_END + i - 2, qt.inv_mul_vec(pelvis_turn, away))
+            memory[FIRST_END + i - 2, 3] = 1.0
+
+
+@helper
+def see_points(facts, filled, frame, told, velocity, features):
+    """Features of the points, seen in ``frame``; lost ones have been filled in."""
     pelvis, tall = vec.load(filled, 0), facts.height
     middle = (facts.middle[0], facts.middle[1], facts.middle[2])
     base = vec.add(pelvis, qt.mul_vec(frame, middle))
     for i in range(1, 6):
-        at = 3 * (i - 1)
-        if filled[i, 3] > 0.0 or i == 1:  # a lost head has been filled in
-            put(
-                features, at, vec.scale(1.0 / tall, qt.inv_mul_vec(frame, vec.sub(vec.load(filled, i), base)))
-            )
-        else:
-            put(features, at, (mean[at], mean[at + 1], mean[at + 2]))
+        away = vec.sub(vec.load(filled, i), base)
+        put(features, 3 * (i - 1), vec.scale(1.0 / tall, qt.inv_mul_vec(frame, away)))
     put(features, 15, qt.inv_mul_vec(frame, UP))
     told = vec.scale(1.0 / tall, told)
     put(features, 18, vec.scale(1.0 / sqrt(1.0 + vec.dot(told, told)), qt.inv_mul_vec(frame, told)))
@@ -42,9 +62,7 @@ def see_points(facts, filled, frame, told, velocity, mean, features):
     ratio = min(vec.norm(vec.sub(vec.load(filled, 1), pelvis)) / facts.whole, 1.0)
     features[24] = ratio
     features[25] = sqrt(1.0 - ratio * ratio + 1e-4)
-    features[26] = mean[26]
-    if filled[2, 3] * filled[3, 3] > 0.0:
-        features[26] = vec.norm(vec.sub(vec.load(filled, 2), vec.load(filled, 3))) / tall
+    features[26] = vec.norm(vec.sub(vec.load(filled, 2), vec.load(filled, 3))) / tall
     for i in range(7):
         features[27 + i] = facts.proportions[i]
 

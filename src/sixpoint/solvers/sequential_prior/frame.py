@@ -2,7 +2,8 @@
 
 The prior sees the points in a frame near the pelvis: Y as SIK+ estimates it, X that of the frame before; or
 the measured rotation of the pelvis. ``memory`` as in ``sequential_plus.frame``, with the X axis of the posed
-pelvis in row 0; row 9 is that axis low-passed.
+pelvis in row 0; row 9 is that axis low-passed, rows 10 to 13 are wrists and ankles as they were last seen
+from the pelvis [m].
 """
 
 from math import exp
@@ -22,7 +23,11 @@ from sixpoint.solvers.sequential_plus.frame import (
 )
 from sixpoint.solvers.sequential_plus.measured import is_measured
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
+from sixpoint.solvers.sequential_plus.pelvis import lean_to_ankles
 from sixpoint.solvers.sequential_prior.features import (
+    mirror,
+    recall_ends,
+    remember_ends,
     see_end,
     see_limb,
     see_points,
@@ -143,12 +148,19 @@ def ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, l
     if not held:
         network = places
         frame, trust = see_frame(memory, vec.load(memory, 8), frame)
-    see_points(facts, filled, frame, told, velocity, network.mean, thought.features)
+    features, mirrored = thought.features, thought.mirrored
+    see_points(facts, filled, frame, told, velocity, features)
     if held:
-        see_rotations(turned, frame, thought.features)
-    trust *= fade(strangeness(thought.features, network.mean, network.spread, POINTS), USUAL, STRANGE)
+        see_rotations(turned, frame, features)
+    mirror(features, held, mirrored)
+    strange = strangeness(features, network.mean, network.spread, POINTS)
+    strange += strangeness(mirrored, network.mean, network.spread, POINTS)
+    trust *= fade(0.5 * strange, USUAL, STRANGE)
     think(network, thought)
     lean_on(model, s, facts, thought, held, frame, trust, local)
+    if not held:
+        remember_x(memory, qt.x_axis(qt.load(local, 0)), s.dt)
+        qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, qt.load(local, 0)))
     return trust
 
 
@@ -173,11 +185,12 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
+    recall_ends(facts, places.mean, qt.load(local, 0), memory, filled)
     _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
     trust = ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local)
     place_trunk(model.segments, local, world, segs)
     x = qt.x_axis(qt.load(local, 0))
-    remember_x(memory, x, s.dt)
+    remember_ends(qt.load(local, 0), filled, memory)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0

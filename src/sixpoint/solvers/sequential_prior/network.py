@@ -1,8 +1,7 @@
 """A small network in compiled code: a linear map and two layers on the same features, added."""
 
 from sixpoint.kernels.jit import algebra, helper
-from sixpoint.solvers.sequential_prior.features import mirror
-from sixpoint.solvers.sequential_prior.packing import OUTPUTS, POINTS
+from sixpoint.solvers.sequential_prior.packing import OUTPUTS
 
 CLIP = 5.0  # standard deviations
 
@@ -33,11 +32,10 @@ def run(network, features, normal, hidden1, hidden2, out):
 
 @helper
 def think(network, thought):
-    """The mean of what the network says, and of what it says in the mirror: no side is preferred."""
+    """The mean of what the network says of the features and of their mirror image: no side is preferred."""
     features, mirrored, out, other = thought.features, thought.mirrored, thought.out, thought.other
     hidden1, hidden2 = thought.hidden1, thought.hidden2
     run(network, features, thought.normal, hidden1, hidden2, out)
-    mirror(features, network.inputs > POINTS, mirrored)
     run(network, mirrored, thought.normal, hidden1, hidden2, other)
     for k in range(0, OUTPUTS, 3):
         out[k] = 0.5 * (out[k] + other[k])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -15,7 +16,7 @@ from sixpoint.body.figure import Figure, SpineChain
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
-from sixpoint.solvers.sequential_plus.solver import SequentialIKPlus
+from sixpoint.solvers.sequential_plus.solver import Habits, SequentialIKPlus
 from sixpoint.solvers.sequential_prior.frame import solve_prior
 from sixpoint.solvers.sequential_prior.packing import (
     END,
@@ -50,10 +51,10 @@ class SequentialIKPrior(SequentialIKPlus):
     Args:
         figure: What to pose.
         limits: Keep every joint within the figure's limits.
+        habits: Constants of SIK+: of the frame of reference, and of what is left to SIK+.
         rotations: Effectors whose measured rotations are used, see ``SequentialIKPlus``. The prior that was
             fitted with rotations is used where that of the pelvis is among them.
         prior: File of a prior of your own (``sixpoint study prior``); the shipped one by default.
-        options: Others of ``SequentialIKPlus``.
 
     Raises:
         SixpointError: As of ``SequentialIKPlus``, or the file holds no prior.
@@ -63,9 +64,17 @@ class SequentialIKPrior(SequentialIKPlus):
 
     _entry = staticmethod(solve_prior)
 
-    def __init__(self, figure: Figure, *, prior: Path | str | None = None, **options: Any) -> None:
+    def __init__(
+        self,
+        figure: Figure,
+        *,
+        limits: bool = True,
+        habits: Habits | None = None,
+        rotations: Sequence[str] = (),
+        prior: Path | str | None = None,
+    ) -> None:
         self._networks = read_prior(None if prior is None else Path(prior))
-        super().__init__(figure, **options)
+        super().__init__(figure, limits=limits, habits=habits, rotations=rotations)
 
     def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
         return (*super()._lower(model), pack_facts(self._find_facts(model)), *self._networks)
