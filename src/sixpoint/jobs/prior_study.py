@@ -168,7 +168,8 @@ def _load(paths: dict[str, list[Path]], progress: Progress) -> list[Recording]:
     for person, files in paths.items():
         for path in files:
             progress("reading", len(found), total)
-            motion = load(path)
+            beside = path.with_name(f"{path.stem.split('_')[0]}.asf")  # named, so that it need not be said
+            motion = load(path, skeleton=beside if path.suffix == ".amc" else None)
             found.append(Recording(person, path, Figure.from_motion(motion), motion))
     return found
 
