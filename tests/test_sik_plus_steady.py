@@ -30,7 +30,8 @@ def solve_limb(target, pole, began, upper, hinge, limb=0, limits=False, dt=1 / 1
     """A limb's root and hinge, and its end, with the figure's lengths and limits."""
     l1, l2, low, high = MODEL.limbs[limb]
     row, h = limb_row(len(MODEL.segments), limb), -1.0 if limb < 2 else 1.0
-    numbers = (HABITS.swivel_memory, HABITS.swivel_speed, dt, limits, MODEL.balls, row, low, high)
+    habits = (0.0, HABITS.swivel_memory, HABITS.swivel_speed)
+    numbers = (*habits, dt, limits, MODEL.balls, row, low, high)
     return limbs.solve_by_pole(
         tuple(target), l1, l2, h, tuple(pole), began, tuple(upper), tuple(hinge), *numbers
     )
@@ -109,17 +110,18 @@ def test_the_way_to_the_pole_takes_time_not_frames(rate):
     def after(hertz: float) -> float:
         angle = 1.5
         for _ in range(round(0.1 * hertz)):
-            angle = limbs.approach(angle, 0.4, 0.02, 5.0, 1 / hertz)
+            angle = limbs.approach(angle, 0.4, 0.03, 0.02, 5.0, 1 / hertz)
         return angle
 
     assert after(rate) == pytest.approx(after(1000.0), abs=0.06)
-    assert limbs.approach(0.3, 1.0, 0.02, 50.0, 1 / 60) == 0.0
-    assert limbs.approach(0.3, 0.5, 0.02, 50.0, 0.0) == 0.3
+    assert limbs.approach(0.3, 1.0, 0.0, 0.02, 50.0, 1 / 60) == 0.0
+    assert limbs.approach(0.3, 0.5, 0.0, 0.02, 50.0, 0.0) == 0.3
 
 
 def test_the_pelvis_turns_at_a_bounded_speed():
     """Points that turn around in one frame turn the pelvis by its largest speed; it arrives all the same."""
     points = np.tile(points_of(FIGURE), (60, 1, 1))
+    points[:, 4:, 1] += 0.2  # legs that need not turn the pelvis to reach
     points[10:] *= [-1.0, 1.0, -1.0]
     solver = sp.SequentialIKPlus(FIGURE, limits=False, habits=replace(HABITS, memory=0.0))
     motion = solver.solve_motion(sp.Targets(points, 120.0))

@@ -66,6 +66,7 @@ def test_the_first_frame_is_what_numpy_says(arrays):
     points = points_of(FIGURE)
     points[1] += [0.03, -0.04, 0.08]
     points[2] += [0.1, 0.3, 0.3]
+    points[4:, 1] += 0.2  # legs that need not turn the pelvis to reach
     solver = sp.SequentialIKPrior(FIGURE, limits=False)
     pelvis = world_matrices(sp.Motion.from_poses([solver.solve(points).pose], 60.0))[1][0, 0]
     plain = sp.SequentialIKPlus(FIGURE, limits=False).solve(points)
@@ -196,20 +197,22 @@ def test_the_way_to_sik_plus_is_smooth():
 
 
 def test_a_wrong_memory_is_forgotten():
-    """A body that was tracked the wrong way round turns back within a second."""
-    targets = FIGURE.targets(sp.make_sample("walk", FIGURE))
-    points = np.tile(targets.positions[60], (120, 1, 1))
+    """A body that was tracked up to half a turn off turns back within a second."""
     solver = sp.SequentialIKPrior(FIGURE)
-    solution = solver.solve(points[0])
-    right = solution.pose
-    state = solution.state[0].copy()
-    for row in (-14, -13, -5):  # X axis, what told it, X axis low-passed
-        state[row, :3] *= [-1.0, 1.0, -1.0]
-    solution = sp.Solution(solution.pose, solution.status, solution.residual, 1, (state,))
-    for p in points:
-        solution = solver.solve(p, previous=solution, dt=1 / 120)
-    between = Rotation.from_quat(solution.pose.rotations[0]).inv() * Rotation.from_quat(right.rotations[0])
-    assert between.magnitude() < 0.15
+    for sample in SAMPLES:
+        points = FIGURE.targets(sp.make_sample(sample, FIGURE)).positions[60]
+        right = None
+        for _ in range(60):
+            right = solver.solve(points, previous=right)
+        for turn in (90, 150, 180):
+            state = right.state[0].copy()
+            for row in (-14, -13, -5):  # X axis, what told it, X axis low-passed
+                state[row, :3] = Rotation.from_euler("y", turn, degrees=True).apply(state[row, :3])
+            solution = sp.Solution(right.pose, right.status, right.residual, 1, (state,))
+            for _ in range(120):
+                solution = solver.solve(points, previous=solution, dt=1 / 120)
+            between = np.array([right.pose.rotations[0], solution.pose.rotations[0]])
+            assert abs(between[0] @ between[1]) > np.cos(0.5 * np.radians(3.0))
 
 
 def test_another_pose_can_be_the_start():
@@ -219,7 +222,10 @@ def test_another_pose_can_be_the_start():
     solver = sp.SequentialIKPlus(FIGURE, limits=False)
     found = solver.solve_frames(targets, start=motion).motion
     off = np.linalg.norm(found.positions - motion.positions, axis=-1)
-    assert off[:, [*FIGURE.roles.spine, *FIGURE.roles.knee]].max() < 1e-6
+    assert np.median(off[:, [*FIGURE.roles.spine, *FIGURE.roles.knee]]) < 1e-6
+    assert (
+        off[:, [*FIGURE.roles.spine, *FIGURE.roles.knee]].max() < 0.03
+    )  # the clip's own feet are out of reach
     assert np.median(off[:, FIGURE.roles.elbow]) < 0.05
     one = solver.solve(targets.positions[7], start=motion.pose(7))
     assert one.status is sp.Status.CONVERGED

@@ -59,8 +59,9 @@ PROMISES = {
     "sik": Promise(),
     # The trunk is closed to 0.1 micrometres; pelvis and swivel angles turn at a bounded speed.
     "sik+": Promise(rest=0.038, free=0.046, neutral=1e-7, settled=60, scaled=3e-3, others=1e-7, upright=True),
+    # Others: while one wrist is lost, the trunk may start out of the other one's reach.
     "sik-prior": Promise(
-        rest=0.05, free=0.05, neutral=1e-4, scaled=0.01, others=1e-7, settled=60, upright=True
+        rest=0.05, free=0.05, neutral=1e-4, scaled=0.01, others=0.045, settled=60, upright=True
     ),
     "tgbsik": Promise(),
     # Rest: CCD, which bends the spine of both from the head, turns its last joint by 36 degrees with limits
@@ -134,9 +135,9 @@ PROMISES = {
         met=0.05,
         rest=0.038,
         free=0.046,
-        neutral=1e-9,
+        neutral=1e-7,
         settled=20,
-        scaled=2e-3,
+        scaled=4e-3,
         others=0.05,
         upright=True,
     ),

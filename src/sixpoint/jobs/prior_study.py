@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -227,6 +228,14 @@ def card(recordings: list[Recording], recipes: dict[str, Recipe], scores: list[S
     rows = "\n".join(f"| {' | '.join(score.cells)} |" for score in scores)
     base, turned = recipes[WITHOUT], recipes[WITH]
     widths = " and ".join(f"{recipe.hidden}" for recipe in recipes.values())
+    fitted = (
+        f"**Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames, seed "
+        f"{base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the "
+        f"hips by {100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard "
+        f"deviations). The loss is what is reported, squared: position error over {base.position} and "
+        f"orientation error over {base.orientation} rad (with rotations over {turned.position} and "
+        f"{turned.orientation}), through closing and forward kinematics."
+    )
     return f"""# Model card of the prior
 
 **What it is.** Two priors, of positions alone and with the measured rotation of the pelvis (those of head,
@@ -234,12 +243,7 @@ hands and feet optional). In each a linear map and a network of two layers ({wid
 features and added, give the start of pelvis, spine and head; linear maps give the directions of elbows and
 knees. `sik-prior` then closes the trunk on the head and the limbs on their points.
 
-**Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames,
-seed {base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved against the hips
-by {100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad (standard deviations). The
-loss is what is reported, squared: position error over {base.position} and orientation error over
-{base.orientation} rad (with rotations over {turned.position} and {turned.orientation}), through closing and
-forward kinematics.
+{fill(fitted, 110)}
 
 **Errors**, limits off: position over the height and orientation [rad], RMS over frames, mean over clips. The
 last two columns have exact rotations of all six points. Only people that the prior was not fitted on say what

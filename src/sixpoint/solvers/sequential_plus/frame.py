@@ -63,8 +63,7 @@ def start_trunk(model, s, filled, turned, local, memory, world, segs):
     """Pelvis and spine before the spine closes on the head; returns the pelvis' X and the chord's unit."""
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     x, y, chord = estimate_pelvis(filled, memory, s)
-    plain = qt.from_axes(x, y, vec.cross(x, y))
-    qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, plain))
+    qt.store(local, 0, qt.from_axes(x, y, vec.cross(x, y)))
     twist_share, bend_share = s.twist_share, s.bend_share
     if is_measured(turned, 0):
         qt.store(local, 0, qt.load(turned, 0))
@@ -96,7 +95,10 @@ def take_start(model, s, given, turned, local):
 
 @helper
 def end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual):
-    """Close the started spine on the head; returns the place of the pelvis."""
+    """Close the started spine on the head; returns the place of the pelvis. ``x`` is what to remember."""
+    if not is_measured(turned, 0):
+        qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, qt.load(local, 0)))
+    place_trunk(model.segments, local, world, segs)
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     goal, count = vec.sub(head, pelvis), segs.shape[0]
     pinned = is_measured(turned, 1) and s.head_site and count > 1
@@ -203,7 +205,6 @@ def solve_frame(model, s, points, turned, given, local, memory, residual, scratc
     if given.shape[0] > 0:
         take_start(model, s, given, turned, local)
         x = qt.x_axis(qt.load(local, 0))
-        place_trunk(model.segments, local, world, segs)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0

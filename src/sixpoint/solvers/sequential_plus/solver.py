@@ -221,6 +221,8 @@ class SequentialIKPlus(SixPointSolver):
             length = np.linalg.norm(given, axis=1, keepdims=True)
             usable = np.isfinite(length) & (length > 1e-6)
             turned[:, k] = np.where(usable, given / np.where(usable, length, 1.0), np.nan)
+            if len(targets) > 1 and not usable.any():
+                raise TargetError(f"{targets.name} has no rotation of {name} in any frame")
         return turned
 
     def _options(self, dt: float) -> Array:

@@ -13,7 +13,6 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
 from sixpoint.kernels.swing_twist import clamp
 from sixpoint.solvers.sequential.packing import unpack_work
-from sixpoint.solvers.sequential.spine import place_trunk
 from sixpoint.solvers.sequential_plus.frame import (
     end_trunk,
     place_limb,
@@ -23,7 +22,6 @@ from sixpoint.solvers.sequential_plus.frame import (
 )
 from sixpoint.solvers.sequential_plus.measured import is_measured
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
-from sixpoint.solvers.sequential_plus.pelvis import lean_to_ankles
 from sixpoint.solvers.sequential_prior.features import (
     mirror,
     recall_ends,
@@ -140,7 +138,7 @@ def lean_on(model, s, facts, thought, held, frame, trust, local):
 
 @helper
 def ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local):
-    """Start the trunk where the prior says, as far as it is trusted; returns that."""
+    """Start the trunk where the prior says, as far as it is trusted; returns the pelvis' X and the trust."""
     held = is_measured(turned, 0)
     told, velocity = vec.load(memory, 1), vec.load(memory, 6)
     frame, trust = qt.load(local, 0), 1.0
@@ -158,10 +156,9 @@ def ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, l
     trust *= fade(0.5 * strange, USUAL, STRANGE)
     think(network, thought)
     lean_on(model, s, facts, thought, held, frame, trust, local)
-    if not held:
-        remember_x(memory, qt.x_axis(qt.load(local, 0)), s.dt)
-        qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, qt.load(local, 0)))
-    return trust
+    x = qt.x_axis(qt.load(local, 0))
+    remember_x(memory, x, s.dt)
+    return x, trust
 
 
 @helper
@@ -187,9 +184,7 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
     lost = fill_lost(points, filled, memory, model.chords[0])
     recall_ends(facts, places.mean, qt.load(local, 0), memory, filled)
     _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
-    trust = ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local)
-    place_trunk(model.segments, local, world, segs)
-    x = qt.x_axis(qt.load(local, 0))
+    x, trust = ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local)
     remember_ends(qt.load(local, 0), filled, memory)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
