@@ -232,9 +232,9 @@ def card(recordings: list[Recording], recipes: dict[str, Recipe], scores: list[S
         f"**Fitted on** {people}, every frame at 30 Hz, in {base.steps} steps of {base.batch} frames, "
         f"seed {base.seed}: mirrored, with lengths changed by up to {base.lengths:.0%}, the root moved "
         f"against the hips by {100 * base.shift:.0f} cm and the frame of reference turned by {base.yaw} rad "
-        f"(standard deviations). The loss is what is reported, squared: position error over {base.position} and "
-        f"orientation error over {base.orientation} rad (with rotations over {turned.position} and "
-        f"{turned.orientation}), through closing and forward kinematics."
+        "(standard deviations). The loss is what is reported, squared: position error over "
+        f"{base.position} and orientation error over {base.orientation} rad (with rotations over "
+        f"{turned.position} and {turned.orientation}), through closing and forward kinematics."
     )
     return f"""# Model card of the prior
 
