@@ -209,7 +209,7 @@ def solve_sequential(
         work: Working memory, see ``packing``.
         options: Weights adapted to the frame rate, and the switches of ``packing.Settings``.
         points: (F, 6, 3) effector positions [m]; NaN where lost.
-        state: (rows + 14, 4) updated.
+        state: (rows + 15, 4) updated.
         rotations: (F, J, 4) out, local rotations of the rig.
         pelvis: (F, 3) out, local position of the pelvis joint [m].
         outcome: (F, 2) out, status and iterations.

@@ -2,7 +2,7 @@
 
 In ``memory`` (see ``six_points.frame``) row 0 is the last X axis and row 1 what told it, low-passed [m]; row
 5 is the direction to the head, row 6 the low-passed velocity of the pelvis [m/s], row 7 its point, which the
-posed pelvis may miss [m], row 8 its low-passed Y axis.
+posed pelvis may miss [m], row 8 its low-passed Y axis, row 9 its turn towards the ankles (a quaternion).
 """
 
 from sixpoint.kernels import quaternion as qt
@@ -15,7 +15,7 @@ from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
 from sixpoint.solvers.sequential_plus.measured import is_measured, lean_to_head, pole_of_end, turn_end
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
-from sixpoint.solvers.sequential_plus.pelvis import estimate_pelvis, lean_to_ankles
+from sixpoint.solvers.sequential_plus.pelvis import estimate_pelvis, keep_leaning
 from sixpoint.solvers.sequential_plus.trunk import bend_spine, close_trunk, twist_to_wrists
 from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, judge, write_frame
 from sixpoint.solvers.six_points.packing import end_row, limb_row, unpack_model
@@ -97,7 +97,9 @@ def take_start(model, s, given, turned, local):
 def end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual):
     """Close the started spine on the head; returns the place of the pelvis. ``x`` is what to remember."""
     if not is_measured(turned, 0):
-        qt.store(local, 0, lean_to_ankles(filled, model.hips, model.limbs, qt.load(local, 0)))
+        qt.store(
+            local, 0, keep_leaning(filled, model.hips, model.limbs, memory, s.kept_lean, qt.load(local, 0))
+        )
     place_trunk(model.segments, local, world, segs)
     pelvis, head = vec.load(filled, 0), vec.load(filled, 1)
     goal, count = vec.sub(head, pelvis), segs.shape[0]

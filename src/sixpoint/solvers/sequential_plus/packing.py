@@ -12,6 +12,7 @@ class Settings(NamedTuple):
         kept: Share of what told X that is kept over the frame.
         kept_speed: Share of the velocity that is kept over the frame.
         kept_tilt: Share of the Y axis that is kept over the frame.
+        kept_lean: Share of the turn towards the ankles that is kept over the frame.
         rate: Frames per second; 0 where no time passed [Hz].
         dt: Time of the frame [s].
         head_site: Whether the head is an end site, turned by the last trunk joint.
@@ -53,6 +54,7 @@ class Settings(NamedTuple):
     kept: float
     kept_speed: float
     kept_tilt: float
+    kept_lean: float
     rate: float
     dt: float
     head_site: bool
@@ -100,5 +102,6 @@ def unpack_settings(options):
         options[35],
         options[36],
         options[37],
-        options[38] > 0.0,
+        options[38],
+        options[39] > 0.0,
     )

@@ -17,6 +17,7 @@ CHEST = 0.75  # height of the chest's point between pelvis and head
 TOLD = 0.02  # m, lines that tell less than this tell nothing
 LEANS = 5  # rounds at most
 LEAN = 0.1  # rad, largest turn in a round
+KEPT = 0.3  # rad, largest turn that is kept
 YIELDING = 1e-4  # m^2, a shorter lever turns less than it would need to
 RUN = 3.0  # m/s, a faster pelvis is a jump of the tracker
 
@@ -132,3 +133,20 @@ def lean_to_ankles(filled, hips, limbs, q):
         if near:
             break
     return qt.normalised(q)
+
+
+@helper
+def keep_leaning(filled, hips, limbs, memory, kept, q):
+    """The pelvis ``q`` turned towards the ankles; a turn once needed is given up slowly.
+
+    Only a small turn is kept: from a large one, of a pelvis that was the wrong way round, there may be no way
+    back.
+    """
+    start = q
+    if memory[4, 0] > 0.0:
+        lean = qt.load(memory, 9)
+        size = vec.norm(qt.log(lean))
+        start = qt.mul(qt.scaled(lean, min(kept, KEPT / max(size, KEPT))), q)
+    turned = lean_to_ankles(filled, hips, limbs, start)
+    qt.store(memory, 9, qt.normalised(qt.mul(turned, qt.inv(q))))
+    return turned

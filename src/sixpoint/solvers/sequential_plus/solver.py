@@ -70,6 +70,7 @@ class Habits:
         memory: Time constant of what tells the pelvis' X axis [s].
         speed_memory: Time constant of the pelvis' velocity [s].
         tilt_memory: Time constant of the pelvis' Y axis [s].
+        lean_memory: Time constant in which the pelvis gives up a turn towards the ankles [s].
     """
 
     chord_share: float = 0.35
@@ -107,6 +108,7 @@ class Habits:
     memory: float = 0.05
     speed_memory: float = 0.15
     tilt_memory: float = 0.05
+    lean_memory: float = 0.3
 
 
 class SequentialIKPlus(SixPointSolver):
@@ -231,8 +233,8 @@ class SequentialIKPlus(SixPointSolver):
             if len(self._adapted) > 100:
                 self._adapted.clear()
             time = min(dt, 1e3) if dt > 0 else 0.0
-            *numbers, memory, speed_memory, tilt_memory = astuple(self.habits)
-            times = (memory, speed_memory, tilt_memory)
+            *numbers, memory, speed_memory, tilt_memory, lean_memory = astuple(self.habits)
+            times = (memory, speed_memory, tilt_memory, lean_memory)
             kept = [exp(-time / constant) if constant > 0 else 0.0 for constant in times]
             rate = 1.0 / time if time > 1e-6 else 0.0
             site = float(np.linalg.norm(self.figure.head_offset) > COINCIDENT)

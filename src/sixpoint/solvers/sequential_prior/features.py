@@ -13,7 +13,7 @@ from sixpoint.solvers.sequential_plus.pelvis import UP
 from sixpoint.solvers.sequential_prior.packing import END, LIMB, MASKS, POINTS, TURNED
 
 SHORT = 1e-6  # m
-FIRST_END = 10  # row of the memory with the left wrist
+FIRST_END = 11  # row of the memory with the left wrist
 
 
 @helper

@@ -2,7 +2,7 @@
 
 The prior sees the points in a frame near the pelvis: Y as SIK+ estimates it, X that of the frame before; or
 the measured rotation of the pelvis. ``memory`` as in ``sequential_plus.frame``, with the X axis of the posed
-pelvis in row 0; row 9 is that axis low-passed, rows 10 to 13 are wrists and ankles as they were last seen
+pelvis in row 0; row 10 is that axis low-passed, rows 11 to 14 are wrists and ankles as they were last seen
 from the pelvis [m].
 """
 
@@ -75,7 +75,7 @@ def see_frame(memory, y, plain):
 
     ``plain`` is the pelvis as SIK+ has it. A memory that contradicts what is told is not trusted.
     """
-    x = vec.unit(vec.reject(vec.load(memory, 9), y))
+    x = vec.unit(vec.reject(vec.load(memory, 10), y))
     if vec.norm(x) < 0.5:
         return plain, 1.0
     told = vec.unit(vec.reject(vec.load(memory, 1), y))
@@ -86,10 +86,10 @@ def see_frame(memory, y, plain):
 @helper
 def remember_x(memory, x, dt):
     """Let the remembered X axis follow that of the posed pelvis."""
-    before = vec.load(memory, 9)
+    before = vec.load(memory, 10)
     kept = exp(-dt / LAG) if vec.norm(before) > 0.5 else 0.0
     now = vec.unit(vec.add(vec.scale(kept, before), vec.scale(1.0 - kept, x)))
-    vec.store(memory, 9, now if vec.norm(now) > 0.5 else x)
+    vec.store(memory, 10, now if vec.norm(now) > 0.5 else x)
 
 
 @helper

@@ -1,7 +1,7 @@
 """How a frame of six points begins and ends, whatever the method.
 
-State between frames is one array (rows + 14, 4): ``local`` (rows, 4) are the anatomical local rotations of
-the posed joints (as many as ``Model.balls`` has rows) and ``memory`` (14, 4) holds the estimated X axis, the
+State between frames is one array (rows + 15, 4): ``local`` (rows, 4) are the anatomical local rotations of
+the posed joints (as many as ``Model.balls`` has rows) and ``memory`` (15, 4) holds the estimated X axis, the
 bending plane's normal (zero if none), the positions of pelvis and head, whether there was a frame before and
 whether the X axis was ever told by wrists or ankles, the estimated Y axis, and rows for what a method
 remembers beside.
@@ -12,7 +12,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.six_points.pelvis import estimate_x, says_something
 
-MEMORY_ROWS = 14
+MEMORY_ROWS = 15
 FAR = 1e7  # m, a point farther away than this, or not a number, counts as lost
 CONVERGED, UNREACHABLE, LOST = 0, 1, 2
 REACHED = 0.01  # m, the paper's stop criterion (Unzueta et al. 2008, section 9)
