@@ -96,9 +96,8 @@ def numbers_of(args: Sequence[Any], names: int, count: int) -> Sequence[float]:
     if len(values) < count:
         raise PacketError(f"{len(args)} arguments, expected {names + count}")
     if not all(type(value) is float or type(value) is int for value in values):
-        raise PacketError(
-            f"types {[type(v).__name__ for v in args][:12]}, expected numbers after {names} names"
-        )
+        types = ", ".join(type(value).__name__ for value in args[:12])
+        raise PacketError(f"types {types}, expected {count} numbers after {names} names")
     if not all(type(name) is str for name in args[:names]):
         raise PacketError(f"type {type(args[0]).__name__}, expected a name first")
     return values
