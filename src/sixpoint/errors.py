@@ -51,6 +51,26 @@ class FormatError(SixpointError):
         super().__init__(text)
 
 
+class PacketError(SixpointError):
+    """A datagram is not what its protocol says: damaged, cut, oversized or mistyped. It is to be dropped."""
+
+
+class OscError(PacketError):
+    """Bytes are not Open Sound Control, or a message cannot be written as such.
+
+    Args:
+        message: What is wrong.
+        offset: Where in the datagram [bytes]; None where a message was to be written.
+        expected: What would have been right there.
+    """
+
+    def __init__(self, message: str, *, offset: int | None = None, expected: str = "") -> None:
+        self.offset = offset
+        self.expected = expected
+        where = "" if offset is None else f"byte {offset}: "
+        super().__init__(f"{where}{message}" + (f" (expected {expected})" if expected else ""))
+
+
 def listed(names: Iterable[str], limit: int = 60) -> str:
     """Join names for a message; after ``limit`` names, say how many more there are."""
     names = list(names)
