@@ -1,0 +1,1 @@
+"""Live tracking: packets -> readings of trackers -> pose -> packets."""
