@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 EFFECTORS = ("pelvis", "head", "l_wrist", "r_wrist", "l_ankle", "r_ankle")
 """The one order of the six effectors."""
 
+GUIDES = ("chest", "l_elbow", "r_elbow", "l_knee", "r_knee")
+"""Points that are not met, but lead trunk and swivel angles where they are tracked."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Targets:
