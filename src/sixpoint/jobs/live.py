@@ -1,0 +1,122 @@
+"""A live session from its settings: figure, solver, ports and receivers, checked before anything is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.targets import EFFECTORS
+from sixpoint.errors import SixpointError
+from sixpoint.live.loop import Channel, LiveLoop, Output
+from sixpoint.live.record import RecordingWriter
+from sixpoint.live.session import Frame, Session
+from sixpoint.live.stance import Posture
+from sixpoint.live.vmc_write import PerformerWriter
+from sixpoint.live.vrchat import TrackerWriter
+from sixpoint.solvers.registry import DEFAULT, find_options, find_solver, make_solver
+
+VMC_IN, VMC_OUT, VRCHAT_OUT = 39540, 39539, 9000
+
+
+@dataclass(frozen=True)
+class Live:
+    """What a live session is made of.
+
+    Attributes:
+        protocol: "vmc", "vrchat" or "plain": what is listened to.
+        port: Where.
+        host: Address to listen on.
+        vmc_out: Receivers of VMC, host and port.
+        vrchat_out: Receivers of VRChat's trackers.
+        method: A name of ``SOLVERS``.
+        stature: Of the person [m]; the avatar is scaled by its receiver.
+        rotations: Whose rotations are used.
+        limits: Keep joints within their limits.
+        smoothing: "off", "light" or "strong".
+        posture: Where legs without trackers are.
+        floor: Height of the floor [m].
+        rate: Poses a second that the timer keeps up [Hz].
+        record: File to record all datagrams to.
+    """
+
+    protocol: str = "vmc"
+    port: int = VMC_IN
+    host: str = "127.0.0.1"
+    vmc_out: tuple[tuple[str, int], ...] = ()
+    vrchat_out: tuple[tuple[str, int], ...] = ()
+    method: str = DEFAULT
+    stature: float = 1.75
+    rotations: tuple[str, ...] = ()
+    limits: bool = True
+    smoothing: str = "off"
+    posture: Posture = "standing"
+    floor: float = 0.0
+    rate: float = 90.0
+    record: Path | None = None
+
+    def make_session(self) -> Session:
+        """The session, its kernels compiled.
+
+        Raises:
+            SixpointError: A setting is impossible; the message says what would work.
+        """
+        figure = Figure.from_stature(self.stature)
+        options: dict[str, object] = {} if self.limits else {"limits": False}
+        if self.rotations:
+            if "rotations" not in find_options(find_solver(self.method)):
+                raise SixpointError(f"{self.method} uses no rotations; sik+ and sik-prior do")
+            options["rotations"] = self.rotations
+        solver = make_solver(self.method, figure, **options)
+        session = Session(figure, solver, smoothing=self.smoothing, posture=self.posture, floor=self.floor)
+        solver.warm_up()
+        return session
+
+    def make_loop(self, watch: Callable[[Channel, Frame], None] | None = None) -> LiveLoop:
+        """The loop, its port open.
+
+        Raises:
+            SixpointError: A setting is impossible, a port in use, or the recording exists.
+        """
+        session = self.make_session()
+        outputs = []
+        if self.vmc_out:
+            performer = PerformerWriter(session.figure)
+
+            def write_vmc(frame: Frame) -> list[bytes]:
+                return performer.write_pose(frame.pose, frame.time, passed=frame.passed, thru=frame.thru)
+
+            outputs += [Output(address, write_vmc) for address in self.vmc_out]
+        if self.vrchat_out:
+            trackers = TrackerWriter(session.figure)
+            outputs += [
+                Output(address, lambda frame: trackers.write_pose(frame.pose)) for address in self.vrchat_out
+            ]
+        channel = Channel(session, self.protocol, self.port, self.host, outputs)
+        recorder = None if self.record is None else RecordingWriter(self.record)
+        return LiveLoop([channel], rate=self.rate, recorder=recorder, watch=watch)
+
+
+def parse_address(text: str, port: int) -> tuple[str, int]:
+    """``host:port``, ``host`` or ``port`` as an address.
+
+    Raises:
+        SixpointError: The port is none.
+    """
+    host, _, number = (
+        text.rpartition(":") if ":" in text else (("", "", text) if text.isdigit() else (text, "", ""))
+    )
+    try:
+        value = int(number) if number else port
+    except ValueError:
+        value = -1
+    if not 0 < value < 65536:
+        raise SixpointError(f"{text!r} is no address: give host:port with a port of 1 to 65535")
+    return host or "127.0.0.1", value
+
+
+def parse_rotations(text: str | None) -> tuple[str, ...]:
+    """Effectors as ``pelvis,head`` or ``all``."""
+    names = tuple(filter(None, (word.strip() for word in (text or "").split(","))))
+    return EFFECTORS if names == ("all",) else names
