@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import struct
+import tracemalloc
 
 import pytest
 from hypothesis import given
@@ -133,6 +134,22 @@ def test_a_hundred_thousand_mutated_packets():
         except OscError:
             pass
     assert 1_000 < read < 99_000
+
+
+def test_a_flood_of_ever_new_tags_fills_no_memory():
+    """What is remembered between packets is bounded: long or changing heads leave nothing behind."""
+    tracemalloc.start()
+    try:
+        osc.decode(b"/a\0\0,\0\0\0")
+        before = tracemalloc.get_traced_memory()[0]
+        for k in range(600):
+            digits = format(k, "010b").replace("0", "T").replace("1", "F")
+            osc.decode(encode(Message("/a", digits, tuple(d == "T" for d in digits))))
+            long = "N" * 4_000 + digits
+            osc.decode(encode(Message("/a", long, (None,) * 4_000 + tuple(d == "T" for d in digits))))
+        assert tracemalloc.get_traced_memory()[0] - before < 1_000_000
+    finally:
+        tracemalloc.stop()
 
 
 WRONG = {

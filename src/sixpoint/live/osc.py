@@ -30,7 +30,7 @@ CONSTANTS = {"T": True, "F": False, "N": None, "I": math.inf}
 
 Plan = tuple[struct.Struct | str, ...]
 
-_SHORT = 64  # bytes of address and type tags that are worth remembering
+_SHORT = 64  # longer heads and type tags are not remembered: a flood must not fill the memory
 _ZEROS = b"\0\0\0\0"
 _NUMBERS = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q"}
 _TYPES = "i, f, s, b, h, d, t, T, F, N, I or an array of them"
@@ -153,7 +153,7 @@ def _read_message(data: bytes, at: int, end: int) -> Message:
     for step in plan:
         if isinstance(step, struct.Struct):
             if step.size > end - at:
-                raise OscError(f"numbers of {tags!r} are cut", offset=at, expected=f"{step.size} bytes")
+                raise OscError(f"numbers of {tags[:40]!r} are cut", offset=at, expected=f"{step.size} bytes")
             values += step.unpack_from(data, at)
             at += step.size
         elif step == "s":
@@ -165,7 +165,7 @@ def _read_message(data: bytes, at: int, end: int) -> Message:
         else:
             values.append(CONSTANTS[step])
     if at != end:
-        raise OscError(f"{end - at} bytes after the arguments {tags!r}", offset=at, expected="the end")
+        raise OscError(f"{end - at} bytes after the arguments {tags[:40]!r}", offset=at, expected="the end")
     return Message(address, tags, _nested(tags, values) if "[" in tags else tuple(values))
 
 
@@ -189,9 +189,21 @@ def _read_short_head(head: bytes) -> tuple[str, str, Plan, int]:
     return _read_head(head, 0, len(head))
 
 
-@lru_cache(maxsize=256)
 def plan_of(tags: str) -> Plan:
-    """Steps that read arguments: a struct for each run of numbers, else the type's letter."""
+    """Steps that read arguments: a struct for each run of numbers, else the type's letter.
+
+    Raises:
+        OscError: A type is unknown, or brackets do not match.
+    """
+    return _short_plan(tags) if len(tags) <= _SHORT else _make_plan(tags)
+
+
+@lru_cache(maxsize=256)
+def _short_plan(tags: str) -> Plan:
+    return _make_plan(tags)
+
+
+def _make_plan(tags: str) -> Plan:
     steps: list[struct.Struct | str] = []
     run = ""
     depth = 0

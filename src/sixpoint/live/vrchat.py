@@ -66,7 +66,7 @@ def read_packet(data: bytes) -> Packet:
             else:
                 unused += 1
         except PacketError as error:
-            refused.append(f"{address[:80]}: {error}")
+            refused.append(f"{ascii(address)[:80]}: {error}")
     time = packet.seconds if isinstance(packet, osc.Bundle) else None
     return Packet(tuple(found.values()), time, unused=unused, refused=tuple(refused))
 
