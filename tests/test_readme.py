@@ -27,9 +27,10 @@ def test_python_blocks_run(tmp_path, monkeypatch, capsys):
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), names)
     assert (tmp_path / "boxing.bvh").exists()
-    first, second = capsys.readouterr().out.splitlines()
+    first, mounts, last = capsys.readouterr().out.splitlines()
     assert 0.01 < float(first) < 0.03
-    assert "r_wrist" in second
+    assert "'l_ankle': 0.00" in mounts and mounts.endswith("{}")
+    assert "r_wrist" in last
 
 
 def test_python_of_the_docs_runs(capsys):
