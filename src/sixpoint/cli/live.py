@@ -35,7 +35,7 @@ def live(
     stature: Annotated[float, Parameter(help="Of the person [m].")] = 1.75,
     rotations: Annotated[
         str | None,
-        Parameter(help="Whose rotations are used too: `all`, or pelvis,head,... With mounts known."),
+        Parameter(help="Whose rotations are used too, once mounts are known: `all`, or pelvis,head,..."),
     ] = None,
     no_limits: Annotated[bool, Parameter(negative="", help="Do not keep joint limits.")] = False,
     smoothing: Annotated[

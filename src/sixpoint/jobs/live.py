@@ -1,7 +1,8 @@
-"""A live session from its settings: figure, solver, ports and receivers, checked before anything is opened."""
+"""A live session from its settings: figure, solver, ports and receivers, checked before a port is opened."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,10 +83,11 @@ class Live:
         session = self.make_session()
         outputs = []
         if self.vmc_out:
-            performer = PerformerWriter(session.figure)
+            performer, start = PerformerWriter(session.figure), time.perf_counter()
 
             def write_vmc(frame: Frame) -> list[bytes]:
-                return performer.write_pose(frame.pose, frame.time, passed=frame.passed, thru=frame.thru)
+                since = frame.time - start  # the protocol has single precision
+                return performer.write_pose(frame.pose, since, passed=frame.passed, thru=frame.thru)
 
             outputs += [Output(address, write_vmc) for address in self.vmc_out]
         if self.vrchat_out:
