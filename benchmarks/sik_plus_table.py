@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from marked import rewrite
 
 import sixpoint as sp
 from sixpoint.study.metrics import measured_joints
@@ -135,16 +136,12 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="into docs/results.md")
     options = parser.parse_args()
     sets = load(options.data, options.held)
-    text = RESULTS.read_text("utf-8")
+    parts = {}
     for mark, make in (("rotations", table_rotations), ("steady", table_steady)):
-        lines = make(sets)
-        print("\n".join(lines), "\n")
-        if options.write:
-            begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-            before, after = text.split(begin)[0], text.split(end)[1]
-            text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
+        parts[mark] = "\n".join(make(sets))
+        print(parts[mark], "\n")
     if options.write:
-        RESULTS.write_text(text, "utf-8")
+        rewrite(RESULTS, parts)
 
 
 if __name__ == "__main__":
