@@ -1,4 +1,4 @@
-"""What measured rotations bring SIK+, and how steady it is: two tables of docs/results.md.
+"""What measured rotations bring SIK+ and SIK with the prior, and how steady they are: for docs/results.md.
 
     python benchmarks/sik_plus_table.py [--data FOLDER] [--held] [--write]
 
@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from marked import rewrite
 
 import sixpoint as sp
 from sixpoint.study.metrics import measured_joints
@@ -35,6 +36,7 @@ GIVEN = {
     "+ pelvis, head, feet": (*sp.EFFECTORS[:2], *sp.EFFECTORS[4:]),
     "+ all six": sp.EFFECTORS,
 }
+METHODS = ("sik", "sik+", "sik-prior")
 ROUNDS = 7
 
 
@@ -55,26 +57,24 @@ def table_rotations(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[
     """Errors by what is given beside the positions."""
     paper = [name for name in sets if name in PAPER]
     names = [*paper, *(["**average of the paper's**"] if paper else []), *(n for n in sets if n not in PAPER)]
-    lines = [f"| rotations given | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-    for given, rotations in GIVEN.items():
-        found = {}
-        for name, clips in sets.items():
-            errors = [
-                sp.compute_errors(
-                    figure,
-                    motion,
-                    sp.SequentialIKPlus(figure, limits=False, rotations=rotations).solve_motion(
-                        figure.targets(motion)
-                    ),
-                )
-                for figure, motion in clips
-            ]
-            found[name] = np.mean([(e.position, e.orientation) for e in errors], axis=0)
-        if paper:
-            found["**average of the paper's**"] = np.mean([found[name] for name in paper], axis=0)
-        cells = [f"{found[name][0]:.4f} / {found[name][1]:.4f}" for name in names]
-        lines.append(f"| {given} | {' | '.join(cells)} |")
+    lines = [f"| method | rotations given | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
+    for method in METHODS[1:]:
+        for given, rotations in GIVEN.items():
+            found = {}
+            for name, clips in sets.items():
+                errors = [measure(method, figure, motion, rotations) for figure, motion in clips]
+                found[name] = np.mean([(e.position, e.orientation) for e in errors], axis=0)
+            if paper:
+                found["**average of the paper's**"] = np.mean([found[name] for name in paper], axis=0)
+            cells = [f"{found[name][0]:.4f} / {found[name][1]:.4f}" for name in names]
+            lines.append(f"| `{method}` | {given} | {' | '.join(cells)} |")
     return lines
+
+
+def measure(method: str, figure: sp.Figure, motion: sp.Motion, rotations: tuple[str, ...]) -> sp.Errors:
+    """Errors where these rotations are given, limits off."""
+    solver = sp.make_solver(method, figure, limits=False, rotations=rotations)
+    return sp.compute_errors(figure, motion, solver.solve_motion(figure.targets(motion)))
 
 
 def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -> tuple[float, float]:
@@ -87,32 +87,34 @@ def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -
 
 def table_steady(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
     """Jumps, acceleration errors and time beside Sequential IK."""
+    names = " | ".join(f"`{method}`" for method in METHODS)
     lines = [
-        "| recordings | limits | jumps: `sik` | `sik+` | truth | acceleration error, m/s^2: `sik` | `sik+` "
-        "| us per frame: `sik` | `sik+` | ratio |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        f"| recordings | limits | jumps: {names} | truth | acceleration error, m/s^2: {names} "
+        f"| us per frame: {names} | times `{METHODS[0]}`: {' | '.join(f'`{m}`' for m in METHODS[1:])} |",
+        "|---" * (2 + 4 * len(METHODS)) + "|",
     ]
     for limits in (False, True):
         for name, clips in sets.items():
-            jumps, errors, times = np.zeros(3, int), [], []
+            jumps, errors, times = np.zeros(len(METHODS) + 1, int), [], []
             for figure, motion in clips:
                 targets = figure.targets(motion)
-                weights = {"weights": WEIGHTS[name]} if name in WEIGHTS else {}
-                solvers = (
-                    sp.SequentialIK(figure, limits=limits, **weights),
-                    sp.SequentialIKPlus(figure, limits=limits),
-                )
+                solvers = make_solvers(figure, name, limits)
                 results = [solver.solve_motion(targets) for solver in solvers]
                 jumps += [find_swivel_jumps(figure, m).sum() for m in (*results, motion)]
                 errors.append([acceleration_error(figure, motion, m) for m in results])
                 times.append(time_solvers(solvers, targets))
-            error, spent = np.mean(errors, axis=0), np.mean(times, axis=0)
-            lines.append(
-                f"| {name} | {'on' if limits else 'off'} | {jumps[0]} | {jumps[1]} | {jumps[2]} "
-                f"| {error[0, 0]:.1f} (RMS {error[0, 1]:.1f}) | {error[1, 0]:.1f} (RMS {error[1, 1]:.1f}) "
-                f"| {spent[0]:.2f} | {spent[1]:.2f} | {spent[1] / spent[0]:.2f} |"
-            )
+            spent = np.mean(times, axis=0)
+            cells = [name, "on" if limits else "off", *map(str, jumps)]
+            cells += [f"{mean:.1f} (RMS {rms:.1f})" for mean, rms in np.mean(errors, axis=0)]
+            cells += [f"{us:.2f}" for us in spent] + [f"{us / spent[0]:.2f}" for us in spent[1:]]
+            lines.append(f"| {' | '.join(cells)} |")
     return lines
+
+
+def make_solvers(figure: sp.Figure, name: str, limits: bool) -> tuple[sp.Solver, ...]:
+    """The methods; Sequential IK with the weights that the paper has for a clip."""
+    options = {"sik": {"weights": WEIGHTS[name]}} if name in WEIGHTS else {}
+    return tuple(sp.make_solver(m, figure, limits=limits, **options.get(m, {})) for m in METHODS)
 
 
 def time_solvers(solvers: tuple[sp.Solver, ...], targets: sp.Targets) -> list[float]:
@@ -134,16 +136,12 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="into docs/results.md")
     options = parser.parse_args()
     sets = load(options.data, options.held)
-    text = RESULTS.read_text("utf-8")
+    parts = {}
     for mark, make in (("rotations", table_rotations), ("steady", table_steady)):
-        lines = make(sets)
-        print("\n".join(lines), "\n")
-        if options.write:
-            begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-            before, after = text.split(begin)[0], text.split(end)[1]
-            text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
+        parts[mark] = "\n".join(make(sets))
+        print(parts[mark], "\n")
     if options.write:
-        RESULTS.write_text(text, "utf-8")
+        rewrite(RESULTS, parts)
 
 
 if __name__ == "__main__":
