@@ -1,9 +1,8 @@
-"""What measured rotations bring SIK+ and SIK with the prior, and how steady they are: for docs/results.md.
+"""How steady SIK+ and SIK with the prior are: a table of docs/results.md.
 
     python benchmarks/sik_plus_table.py [--data FOLDER] [--held] [--write]
 
-Rotations are exact: those of the recording, limits off. Without ``--held`` the paper's clips are measured
-too; ``--write`` brings the tables into docs/results.md.
+Without ``--held`` the paper's clips are measured too; ``--write`` brings the table into docs/results.md.
 """
 
 from __future__ import annotations
@@ -29,13 +28,6 @@ PAPER = {
     "playground": ("paper/01_03.amc", 0),
 }
 WEIGHTS = {"boxing": (1.0, 1.0, 0.0), "jump kick": (1.0, 1.0, 0.0)}
-GIVEN = {
-    "positions only": (),
-    "+ pelvis": sp.EFFECTORS[:1],
-    "+ pelvis, head": sp.EFFECTORS[:2],
-    "+ pelvis, head, feet": (*sp.EFFECTORS[:2], *sp.EFFECTORS[4:]),
-    "+ all six": sp.EFFECTORS,
-}
 METHODS = ("sik", "sik+", "sik-prior")
 ROUNDS = 7
 
@@ -51,30 +43,6 @@ def load(folder: Path, held: bool) -> dict[str, list[tuple[sp.Figure, sp.Motion]
         motions = [sp.load(folder / file).sliced(slice(skip, None)) for file, skip in clips]
         out[name] = [(sp.Figure.from_motion(motion), motion) for motion in motions]
     return out
-
-
-def table_rotations(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
-    """Errors by what is given beside the positions."""
-    paper = [name for name in sets if name in PAPER]
-    names = [*paper, *(["**average of the paper's**"] if paper else []), *(n for n in sets if n not in PAPER)]
-    lines = [f"| method | rotations given | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
-    for method in METHODS[1:]:
-        for given, rotations in GIVEN.items():
-            found = {}
-            for name, clips in sets.items():
-                errors = [measure(method, figure, motion, rotations) for figure, motion in clips]
-                found[name] = np.mean([(e.position, e.orientation) for e in errors], axis=0)
-            if paper:
-                found["**average of the paper's**"] = np.mean([found[name] for name in paper], axis=0)
-            cells = [f"{found[name][0]:.4f} / {found[name][1]:.4f}" for name in names]
-            lines.append(f"| `{method}` | {given} | {' | '.join(cells)} |")
-    return lines
-
-
-def measure(method: str, figure: sp.Figure, motion: sp.Motion, rotations: tuple[str, ...]) -> sp.Errors:
-    """Errors where these rotations are given, limits off."""
-    solver = sp.make_solver(method, figure, limits=False, rotations=rotations)
-    return sp.compute_errors(figure, motion, solver.solve_motion(figure.targets(motion)))
 
 
 def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -> tuple[float, float]:
@@ -129,19 +97,16 @@ def time_solvers(solvers: tuple[sp.Solver, ...], targets: sp.Targets) -> list[fl
 
 
 def main() -> None:
-    """Print the tables, and write them if asked to."""
+    """Print the table, and write it if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--held", action="store_true", help="leave the paper's clips alone")
     parser.add_argument("--write", action="store_true", help="into docs/results.md")
     options = parser.parse_args()
-    sets = load(options.data, options.held)
-    parts = {}
-    for mark, make in (("rotations", table_rotations), ("steady", table_steady)):
-        parts[mark] = "\n".join(make(sets))
-        print(parts[mark], "\n")
+    table = "\n".join(table_steady(load(options.data, options.held)))
+    print(table)
     if options.write:
-        rewrite(RESULTS, parts)
+        rewrite(RESULTS, {"steady": table})
 
 
 if __name__ == "__main__":
