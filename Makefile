@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test check benchmark results comparison ablation peers study examples picture clean
+.PHONY: demo test check benchmark results comparison trackers ablation peers study examples picture clean
 
 demo: $(VENV)/run.stamp  ## Reconstruct the built-in motions; pictures and BVH files in demo/
 	$(BIN)/sixpoint demo --force
@@ -26,6 +26,9 @@ results: $(VENV)/run.stamp  ## Measure the paper's clips again and rewrite docs/
 
 comparison: $(VENV)/run.stamp  ## Compare all methods on the paper's clips and rewrite docs/results.md
 	$(BIN)/python benchmarks/comparison.py
+
+trackers: $(VENV)/run.stamp  ## Measure trackers with six degrees of freedom and rewrite docs/results.md
+	$(BIN)/python benchmarks/trackers.py --write
 
 ablation: $(VENV)/run.stamp  ## Switch off each rule and input of SIK+ and rewrite docs/results.md
 	$(BIN)/python benchmarks/ablation.py

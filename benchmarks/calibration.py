@@ -33,22 +33,33 @@ Array = NDArray[np.float64]
 Row = tuple[Array, Array, float, float]
 
 
-def track(figure: sp.Figure, motion: sp.Motion, seed: int) -> tuple[sp.Targets, Array, Rotation]:
-    """Trackers on a motion, the offsets (6, 3) [m] and the mount rotations."""
-    rng = np.random.default_rng(seed + 1000)
-    joints = figure.targets(motion)
-    assert joints.rotations is not None
-    points, turned = np.array(joints.positions), np.array(joints.rotations)
+def draw_mounts(rng: np.random.Generator) -> tuple[Array, Rotation]:
+    """Offsets (6, 3) of 2 to 12 cm [m] and mount rotations, segment<-tracker, any."""
     offsets = rng.normal(size=(6, 3))
     offsets *= (rng.uniform(0.02, 0.12, 6) / np.linalg.norm(offsets, axis=1))[:, None]
-    mounts = Rotation.random(6, random_state=rng)
+    return offsets, Rotation.random(6, random_state=rng)
+
+
+def wear(
+    joints: sp.Targets, offsets: Array, mounts: Rotation, rng: np.random.Generator, noise: float = 1.0
+) -> sp.Targets:
+    """What six trackers report that are mounted so; ``noise`` scales that of each frame."""
+    assert joints.rotations is not None
+    points, turned = np.array(joints.positions), np.array(joints.rotations)
     for k in range(6):
         rotation = Rotation.from_quat(turned[:, k]) * mounts[k]
         points[:, k] += rotation.apply(offsets[k])
-        noise = Rotation.from_rotvec(rng.normal(scale=ROTATION, size=(len(points), 3)))
-        turned[:, k] = (rotation * noise).as_quat()
-    points += rng.normal(scale=POSITION, size=points.shape)
-    return sp.Targets(points, joints.rate, turned), offsets, mounts
+        errors = Rotation.from_rotvec(noise * rng.normal(scale=ROTATION, size=(len(points), 3)))
+        turned[:, k] = (rotation * errors).as_quat()
+    points += noise * rng.normal(scale=POSITION, size=points.shape)
+    return sp.Targets(points, joints.rate, turned, joints.name)
+
+
+def track(figure: sp.Figure, motion: sp.Motion, seed: int) -> tuple[sp.Targets, Array, Rotation]:
+    """Trackers on a motion, the offsets (6, 3) [m] and the mount rotations."""
+    rng = np.random.default_rng(seed + 1000)
+    offsets, mounts = draw_mounts(rng)
+    return wear(figure.targets(motion), offsets, mounts, rng), offsets, mounts
 
 
 def measure(figure: sp.Figure, motion: sp.Motion, seed: int, known: str) -> Row | None:

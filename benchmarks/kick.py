@@ -31,6 +31,7 @@ Array = np.ndarray
 METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "sik": (INK, {"weights": sp.FIGHTING}),
     "sik+": (SERIES[4], {}),
+    "sik-prior": (SERIES[3], {}),
 }
 """Method -> colour of its curve, options. A further one joins the curves."""
 SHOWN = "sik+"  # whose body is drawn

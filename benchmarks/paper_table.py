@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
 RESULTS = ROOT / "docs" / "results.md"
 MARKS = ("table", "pik", "plus")
+PLUS = ("sik", "sik+", "sik-prior")
 
 PAPER = {"boxing": (0.0265, 0.2508), "jump kick": (0.0213, 0.2849), "playground": (0.0261, 0.3469)}
 PAPER_PIK = {"boxing": (0.0283, 0.3256), "jump kick": (0.0247, 0.3447), "playground": (0.0240, 0.3472)}
@@ -108,7 +109,7 @@ def table_pik(folder: Path) -> list[str]:
 
 
 def table_plus(folder: Path) -> list[str]:
-    """Markdown rows of SIK+ beside Sequential IK: the paper's clips, and what its constants never saw."""
+    """Markdown rows of SIK+, without and with the prior, beside Sequential IK."""
     sets = {
         "boxing": [("paper/17_10.amc", (1.0, 1.0, 0.0), 0)],
         "jump kick": [("paper/90_05_repaired.bvh", (1.0, 1.0, 0.0), 1)],
@@ -121,40 +122,44 @@ def table_plus(folder: Path) -> list[str]:
         ],
         "Xsens": [(f"xsens/{p.name}", None, 0) for p in sorted((folder / "xsens").glob("*.bvh"))],
     }
+    names = " | ".join(f"`{method}`" for method in PLUS)
     lines = [
-        "| recordings | `sik`, limits off | `sik+`, limits off | `sik`, limits on | `sik+`, limits on "
-        "| frames missed, limits on |",
-        "|---|---|---|---|---|---|",
+        f"| recordings | limits | {names} | frames missed: {names} |",
+        "|---" * (2 + 2 * len(PLUS)) + "|",
     ]
-    means = []
-    for name, clips in sets.items():
-        found = np.array([plus_row(folder, *clip) for clip in clips]).mean(axis=0)
-        means.append(found)
-        lines.append(plus_line(name, found))
-        if len(means) == 3:
-            lines.append(plus_line("**average of the paper's**", np.mean(means, axis=0)))
+    for limits in (False, True):
+        means = []
+        for name, clips in sets.items():
+            found = np.mean([plus_row(folder, *clip, limits=limits) for clip in clips], axis=0)
+            means.append(found)
+            lines.append(plus_line(name, limits, found))
+            if len(means) == 3:
+                lines.append(plus_line("**average of the paper's**", limits, np.mean(means, axis=0)))
     return lines
 
 
-def plus_row(folder: Path, file: str, weights: tuple[float, float, float] | None, skip: int) -> list[float]:
-    """Errors of both methods with limits off and on, and the frames that each misses with limits on."""
+def plus_row(
+    folder: Path, file: str, weights: tuple[float, float, float] | None, skip: int, limits: bool
+) -> list[tuple[float, float, float]]:
+    """Of each method: errors, and the share of frames with a point more than 1 cm off."""
     motion = sp.load(folder / file).sliced(slice(skip, None))
     figure = sp.Figure.from_motion(motion)
     targets = figure.targets(motion)
-    out: list[float] = []
-    for limits in (False, True):
-        plain = sp.SequentialIK(figure, limits=limits, **({"weights": weights} if weights else {}))
-        for solver in (plain, sp.SequentialIKPlus(figure, limits=limits)):
-            solved = solver.solve_frames(targets)
-            errors = sp.compute_errors(figure, motion, solved.motion)
-            out += [errors.position, errors.orientation, solved.count(sp.Status.UNREACHABLE) / len(motion)]
+    out = []
+    for method in PLUS:
+        options = {"weights": weights} if weights and method == "sik" else {}
+        solved = sp.make_solver(method, figure, limits=limits, **options).solve_frames(targets)
+        errors = sp.compute_errors(figure, motion, solved.motion)
+        missed = solved.count(sp.Status.UNREACHABLE) / len(motion)
+        out.append((errors.position, errors.orientation, missed))
     return out
 
 
-def plus_line(name: str, found: np.ndarray) -> str:
+def plus_line(name: str, limits: bool, found: np.ndarray) -> str:
     """One Markdown row."""
-    cells = [f"{found[k]:.4f} / {found[k + 1]:.4f}" for k in (0, 3, 6, 9)]
-    return f"| {name} | {' | '.join(cells)} | {100 * found[8]:.0f} %, {100 * found[11]:.0f} % |"
+    cells = [f"{position:.4f} / {orientation:.4f}" for position, orientation, _ in found]
+    cells += [f"{100 * missed:.1f} %" for *_, missed in found]
+    return f"| {name} | {'on' if limits else 'off'} | {' | '.join(cells)} |"
 
 
 def row(name, missed, free, limited, paper) -> str:

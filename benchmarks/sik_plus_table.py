@@ -1,9 +1,8 @@
-"""What measured rotations bring SIK+, and how steady it is: two tables of docs/results.md.
+"""How steady SIK+ and SIK with the prior are: a table of docs/results.md.
 
     python benchmarks/sik_plus_table.py [--data FOLDER] [--held] [--write]
 
-Rotations are exact: those of the recording, limits off. Without ``--held`` the paper's clips are measured
-too; ``--write`` brings the tables into docs/results.md.
+Without ``--held`` the paper's clips are measured too; ``--write`` brings the table into docs/results.md.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from marked import rewrite
 
 import sixpoint as sp
 from sixpoint.study.metrics import measured_joints
@@ -28,13 +28,7 @@ PAPER = {
     "playground": ("paper/01_03.amc", 0),
 }
 WEIGHTS = {"boxing": (1.0, 1.0, 0.0), "jump kick": (1.0, 1.0, 0.0)}
-GIVEN = {
-    "positions only": (),
-    "+ pelvis": sp.EFFECTORS[:1],
-    "+ pelvis, head": sp.EFFECTORS[:2],
-    "+ pelvis, head, feet": (*sp.EFFECTORS[:2], *sp.EFFECTORS[4:]),
-    "+ all six": sp.EFFECTORS,
-}
+METHODS = ("sik", "sik+", "sik-prior")
 ROUNDS = 7
 
 
@@ -51,32 +45,6 @@ def load(folder: Path, held: bool) -> dict[str, list[tuple[sp.Figure, sp.Motion]
     return out
 
 
-def table_rotations(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
-    """Errors by what is given beside the positions."""
-    paper = [name for name in sets if name in PAPER]
-    names = [*paper, *(["**average of the paper's**"] if paper else []), *(n for n in sets if n not in PAPER)]
-    lines = [f"| rotations given | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-    for given, rotations in GIVEN.items():
-        found = {}
-        for name, clips in sets.items():
-            errors = [
-                sp.compute_errors(
-                    figure,
-                    motion,
-                    sp.SequentialIKPlus(figure, limits=False, rotations=rotations).solve_motion(
-                        figure.targets(motion)
-                    ),
-                )
-                for figure, motion in clips
-            ]
-            found[name] = np.mean([(e.position, e.orientation) for e in errors], axis=0)
-        if paper:
-            found["**average of the paper's**"] = np.mean([found[name] for name in paper], axis=0)
-        cells = [f"{found[name][0]:.4f} / {found[name][1]:.4f}" for name in names]
-        lines.append(f"| {given} | {' | '.join(cells)} |")
-    return lines
-
-
 def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -> tuple[float, float]:
     """Mean, and root of the mean square, of the joints' acceleration errors [m/s^2]."""
     joints = measured_joints(figure)
@@ -87,32 +55,34 @@ def acceleration_error(figure: sp.Figure, truth: sp.Motion, result: sp.Motion) -
 
 def table_steady(sets: dict[str, list[tuple[sp.Figure, sp.Motion]]]) -> list[str]:
     """Jumps, acceleration errors and time beside Sequential IK."""
+    names = " | ".join(f"`{method}`" for method in METHODS)
     lines = [
-        "| recordings | limits | jumps: `sik` | `sik+` | truth | acceleration error, m/s^2: `sik` | `sik+` "
-        "| us per frame: `sik` | `sik+` | ratio |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        f"| recordings | limits | jumps: {names} | truth | acceleration error, m/s^2: {names} "
+        f"| us per frame: {names} | times `{METHODS[0]}`: {' | '.join(f'`{m}`' for m in METHODS[1:])} |",
+        "|---" * (2 + 4 * len(METHODS)) + "|",
     ]
     for limits in (False, True):
         for name, clips in sets.items():
-            jumps, errors, times = np.zeros(3, int), [], []
+            jumps, errors, times = np.zeros(len(METHODS) + 1, int), [], []
             for figure, motion in clips:
                 targets = figure.targets(motion)
-                weights = {"weights": WEIGHTS[name]} if name in WEIGHTS else {}
-                solvers = (
-                    sp.SequentialIK(figure, limits=limits, **weights),
-                    sp.SequentialIKPlus(figure, limits=limits),
-                )
+                solvers = make_solvers(figure, name, limits)
                 results = [solver.solve_motion(targets) for solver in solvers]
                 jumps += [find_swivel_jumps(figure, m).sum() for m in (*results, motion)]
                 errors.append([acceleration_error(figure, motion, m) for m in results])
                 times.append(time_solvers(solvers, targets))
-            error, spent = np.mean(errors, axis=0), np.mean(times, axis=0)
-            lines.append(
-                f"| {name} | {'on' if limits else 'off'} | {jumps[0]} | {jumps[1]} | {jumps[2]} "
-                f"| {error[0, 0]:.1f} (RMS {error[0, 1]:.1f}) | {error[1, 0]:.1f} (RMS {error[1, 1]:.1f}) "
-                f"| {spent[0]:.2f} | {spent[1]:.2f} | {spent[1] / spent[0]:.2f} |"
-            )
+            spent = np.mean(times, axis=0)
+            cells = [name, "on" if limits else "off", *map(str, jumps)]
+            cells += [f"{mean:.1f} (RMS {rms:.1f})" for mean, rms in np.mean(errors, axis=0)]
+            cells += [f"{us:.2f}" for us in spent] + [f"{us / spent[0]:.2f}" for us in spent[1:]]
+            lines.append(f"| {' | '.join(cells)} |")
     return lines
+
+
+def make_solvers(figure: sp.Figure, name: str, limits: bool) -> tuple[sp.Solver, ...]:
+    """The methods; Sequential IK with the weights that the paper has for a clip."""
+    options = {"sik": {"weights": WEIGHTS[name]}} if name in WEIGHTS else {}
+    return tuple(sp.make_solver(m, figure, limits=limits, **options.get(m, {})) for m in METHODS)
 
 
 def time_solvers(solvers: tuple[sp.Solver, ...], targets: sp.Targets) -> list[float]:
@@ -127,23 +97,16 @@ def time_solvers(solvers: tuple[sp.Solver, ...], targets: sp.Targets) -> list[fl
 
 
 def main() -> None:
-    """Print the tables, and write them if asked to."""
+    """Print the table, and write it if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--held", action="store_true", help="leave the paper's clips alone")
     parser.add_argument("--write", action="store_true", help="into docs/results.md")
     options = parser.parse_args()
-    sets = load(options.data, options.held)
-    text = RESULTS.read_text("utf-8")
-    for mark, make in (("rotations", table_rotations), ("steady", table_steady)):
-        lines = make(sets)
-        print("\n".join(lines), "\n")
-        if options.write:
-            begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
-            before, after = text.split(begin)[0], text.split(end)[1]
-            text = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
+    table = "\n".join(table_steady(load(options.data, options.held)))
+    print(table)
     if options.write:
-        RESULTS.write_text(text, "utf-8")
+        rewrite(RESULTS, {"steady": table})
 
 
 if __name__ == "__main__":

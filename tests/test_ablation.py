@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
+from sixpoint.study.metrics import measured_joints
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
@@ -28,7 +29,7 @@ def test_every_constant_is_switched_off_alone():
 
 
 def test_rows_are_measured_like_the_library_does():
-    """The errors of a row are those of its solver, limits off, without rotations."""
+    """The errors of a row are those of its solver, limits off and without rotations unless it says so."""
     figure = sp.Figure.from_stature(1.75)
     recordings = []
     for column, sample in zip(ablation.SETS, ("walk", "boxing", "reach"), strict=True):
@@ -41,12 +42,25 @@ def test_rows_are_measured_like_the_library_does():
             sp.SequentialIKPlus(figure, limits=False, habits=sp.Habits(reach=0.0)),
         ),
         (ablation.Variant("x", method="sik"), sp.SequentialIK(figure, limits=False, weights=sp.FIGHTING)),
+        (ablation.Variant("x", limits=True), sp.SequentialIKPlus(figure)),
+        (
+            ablation.off_turned("x", head_hold=0.0),
+            sp.SequentialIKPlus(
+                figure, limits=False, habits=sp.Habits(head_hold=0.0), rotations=sp.EFFECTORS
+            ),
+        ),
     ):
-        found = ablation.measure(variant, recordings)
-        for own, r in zip(found, recordings, strict=True):
-            result = solver.solve_motion(sp.Targets(r.targets.positions, r.targets.rate))
+        found, shaken = ablation.measure(variant, recordings), []
+        for own, r in zip(found[:-1], recordings, strict=True):
+            turned = r.targets.rotations if variant.rotations else None
+            result = solver.solve_motion(sp.Targets(r.targets.positions, r.targets.rate, turned))
             errors = sp.compute_errors(figure, r.truth, result)
             assert own == pytest.approx([errors.position, errors.orientation], abs=1e-12)
+            own, true = (m.positions[:, measured_joints(figure)] for m in (result, r.truth))
+            off = (own[2:] - 2 * own[1:-1] + own[:-2]) - (true[2:] - 2 * true[1:-1] + true[:-2])
+            size = np.sqrt((off**2).sum(axis=-1)) * r.truth.rate**2
+            shaken.append([size.mean(), np.sqrt((size**2).mean())])
+        assert found[-1] == pytest.approx(np.mean(shaken, axis=0))
 
 
 def test_moments_of_a_jump_are_in_order():

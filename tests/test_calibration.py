@@ -98,6 +98,16 @@ def test_mount_rotations_come_from_the_pose():
         assert np.linalg.norm(wrong[[0, 2]]) < np.radians(0.6)  # tilt
 
 
+def test_a_head_that_is_an_end_site_is_found(data):
+    """The head's point may be 17 cm above the joint that it turns about: its offset counts from the point."""
+    figure = sp.Figure.from_motion(sp.load(data / "xsens" / "example_2.bvh"))
+    assert np.linalg.norm(figure.head_offset) > 0.15
+    targets, offsets, _ = track(figure.targets(range_of_motion(figure, 0, sloppy=0.03)), 0)
+    assert errors(sp.calibrate(targets, figure), offsets)["head"] < 0.012
+    moving = targets.sliced(slice(200, None))  # nobody stands still: no mounts, so the pivot does not tell it
+    assert "head offset" in sp.calibrate(moving, figure).unobserved
+
+
 def test_a_t_pose_turns_the_hands_by_a_quarter():
     """In a T-pose, facing anywhere, all mount rotations differ by the same small error of heading."""
     figure = sp.Figure.from_stature(STATURE)

@@ -134,6 +134,18 @@ def test_poorest_and_farthest_are_two_statements(jt, worst, far):
     assert f"jt is {2000 * jt[1]:.1f} mm off on average, of the others at most 40.0 mm (ccd)" in miss.measured
 
 
+def test_statements_are_of_the_paper_s_methods():
+    """A method that the paper does not have is neither worst nor farthest, and its peaks are nobody's."""
+    rows = make_rows(jt=(0.5, 0.05), sik=(0.02, 0.0), own=(0.9, 0.9))
+    tested = Comparison("t", ("jt", "sik", "own"), rows, ())
+    for words in ("Jacobian transpose gives", "Jacobian transpose leaves its effectors"):
+        assert find_claim(tested, words).holds
+    clip = make_peaky_clip(PEAKS, (280, 520, 725))
+    own = replace(clip.runs["sik"], position=np.roll(clip.runs["sik"].position, 50) * 100.0)
+    assert judge(replace(clip, runs={**clip.runs, "own": own})) == judge(clip)
+    assert judge(replace(clip, runs={"own": own})) is None
+
+
 def test_the_transpose_alone_is_not_judged():
     """Against nobody it is neither worst nor farthest."""
     assert check_claims(Comparison("t", ("jt",), make_rows(jt=(0.5, 0.05)), ()), "unzueta2008") == ()

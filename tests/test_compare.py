@@ -444,7 +444,7 @@ def test_methods_are_chosen_by_name(folder):
     assert [m.name for m in choose_methods("all")] == list(sp.SOLVERS)
     assert [m.solver for m in choose_methods("kma, own_methods:Own")] == ["kma", "own_methods:Own"]
     for text, message in (
-        ("sick", "methods: sik, sik\\+, tgbsik"),
+        ("sick", "methods: sik, sik\\+, sik-prior, tgbsik"),
         ("own_methods:Nothing", "no class or function 'Nothing'"),
         ("no_such_module:X", "cannot be imported"),
         ("", "no methods"),

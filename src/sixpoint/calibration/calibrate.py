@@ -151,10 +151,14 @@ def _prior_body(standing: Standing | None, figure: Figure | None, stature: float
 
 def _pivots(tracks: Tracks, standing: Standing | None, mounts: Array, body: Body) -> list[Estimate]:
     estimates = [Estimate.nothing()]
+    site = body.figure.head_offset
     for k, rest in body.rests(mounts).items():
-        axis = mounts[k].T @ UP if np.isfinite(mounts[k]).all() else None
+        known = bool(np.isfinite(mounts[k]).all())
+        axis = mounts[k].T @ UP if known else None
         ground = _ground(tracks, standing, k) if k >= 4 else None
         points, turns = tracks.positions[:, k], tracks.turns[:, k]
+        if k == 1 and site.any():  # a head that is an end site is not where it turns
+            points = points - turns @ (mounts[1].T @ site if known else np.full(3, np.nan))
         estimates.append(find_pivots(points, turns, tracks.rotations[:, k], tracks.rate, axis, rest, ground))
     estimates[1] = estimates[1].blurred(body.neck_std)
     return estimates

@@ -19,10 +19,11 @@ from sixpoint.calibration.standing import Posture
 Array = NDArray[np.float64]
 
 ANKLE_HEIGHT = 0.039  # of the stature, over the floor; Drillis & Contini 1966
-# Standard deviation of a standing person's heights [m]: of head, wrists, ankles.
-STD_GIVEN = (0.010, 0.020, 0.006)  # lengths known: posture alone
-STD_STATURE = (0.020, 0.040, 0.007)  # by proportion of a known stature
-STD_FOUND = (np.inf, np.inf, 0.008)  # by proportion of a stature that the head's own offset goes into
+# Standard deviation of a standing person's heights [m]: of head, wrists, ankles. Ankles are over the floor by
+# proportion even where lengths are known: soles differ, and so do the ankles of one and the same rig.
+STD_GIVEN = (0.010, 0.020, 0.010)  # lengths known: posture
+STD_STATURE = (0.020, 0.040, 0.010)  # by proportion of a known stature
+STD_FOUND = (np.inf, np.inf, 0.010)  # by proportion of a stature that the head's own offset goes into
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,14 +55,15 @@ def range_of_motion(figure: Figure, seed: int = 0, *, sloppy: float = 0.05, rate
         circles = _circles(t, lifted[side], (15.0, 32.0, 22.0), rng)
         give = sloppy * (_give(circles, rng) + _wander(t, rng))
         flexion, away = np.radians(rng.uniform([10.0, 25.0], [22.0, 34.0]))
-        swing = np.outer(lifted[side], [sign * away, -flexion, 0.0])
-        swing[:, :2] += give[:, [2, 0]] * (lifted[0] + lifted[1])[:, None]
-        hip = roles.hip[side]
-        turned[:, hip] = rot.mul(turned[:, hip], rot.from_euler("ZXY", swing))
         bend = np.radians(
             rng.uniform(1.0, 7.0) + rng.uniform(0.0, 1.0) * np.sin(2.5 * t + rng.uniform(0, 6.3))
         )
-        turned[:, roles.knee[side]] = rot.from_axis_angle(X, np.radians(bend))
+        swing = np.outer(lifted[side], [sign * away, -flexion, 0.0])
+        swing[:, :2] += give[:, [2, 0]] * (lifted[0] + lifted[1])[:, None]
+        swing[:, 1] -= 0.5 * bend  # the ankle stays below the hip
+        hip = roles.hip[side]
+        turned[:, hip] = rot.mul(turned[:, hip], rot.from_euler("ZXY", swing))
+        turned[:, roles.knee[side]] = rot.from_axis_angle(X, bend)
         turned[:, roles.ankle[side]] = rot.from_euler("YXZ", circles)
     return _planted(figure, turned, lifted, rate)
 

@@ -28,7 +28,7 @@ from sixpoint.study.comparison.results import rows_to_csv
 REPORT = ("report.html", "report.md")
 LIMITATIONS = (
     "Six positions do not tell the rotations of hands, feet and head, nor the pelvis' own yaw: all methods "
-    "but sik+, pik and pik-flext share one estimate of the pelvis, and its error.",
+    "but sik+, sik-prior, hybrid, pik and pik-flext share one estimate of the pelvis, and its error.",
     "Methods are our own implementations with the presets above; where the papers are silent we chose, see "
     "docs/methods.md.",
     "Joint limits are those of the shipped table unless said otherwise; the truth itself leaves them, mostly "

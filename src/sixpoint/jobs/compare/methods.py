@@ -17,6 +17,7 @@ STOP = "stops at 1 cm, at a gain below 1 mm, or after 20 iterations"
 PRESETS: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "sik": ({}, "closed form; the chord search is exact"),
     "sik+": ({}, "constants as benchmarks/tune_sik_plus.py chose them"),
+    "sik-prior": ({}, "as sik+; trunk, elbows and knees start where the fitted prior says, docs/prior.md"),
     "tgbsik": ({}, "weight of twist 1; swivel searched on the whole circle by 0.1, then 0.01 rad"),
     "kma": ({}, f"from the standing pose; swivel angles zero; the spine's CCD {STOP}"),
     "ccd": ({}, f"from tip to root; {STOP}"),

@@ -63,6 +63,8 @@ class HybridIK:
         SixpointError: An option or a task makes no sense, or ``start`` is of another figure.
     """
 
+    fitted_on = SequentialIKPlus.fitted_on
+
     def __init__(
         self,
         figure: Figure,

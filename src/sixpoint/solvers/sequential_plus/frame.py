@@ -198,15 +198,12 @@ def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, 
 
 
 @helper
-def solve_frame(model, s, points, turned, given, local, memory, residual, scratch):
+def solve_frame(model, s, points, turned, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
-    if given.shape[0] > 0:
-        take_start(model, s, given, turned, local)
-        x = qt.x_axis(qt.load(local, 0))
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
     for limb in range(4):
         residual[limb + 2] = 0.0
@@ -215,16 +212,65 @@ def solve_frame(model, s, points, turned, given, local, memory, residual, scratc
         target = vec.load(filled, limb + 2)
         frame, place = place_limb(model, s, limb, root, target, local, world, segs)
         n = vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place)))
-        if given.shape[0] > 0:
-            pole = pole_of_start(given, limb, n, frame)
-        else:
-            pole = point_limb(s, limb, n, frame, turned)
+        pole = point_limb(s, limb, n, frame, turned)
+        pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
+    return judge(lost, residual)
+
+
+@helper
+def solve_frame_from(model, s, points, turned, given, local, memory, residual, scratch):
+    """The same from a given pose, see ``start``."""
+    world, segs, filled = scratch.world, scratch.segs, scratch.filled
+    began = memory[4, 0] > 0.0
+    lost = fill_lost(points, filled, memory, model.chords[0])
+    _, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
+    take_start(model, s, given, turned, local)
+    x = qt.x_axis(qt.load(local, 0))
+    root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
+    for limb in range(4):
+        residual[limb + 2] = 0.0
+        if filled[limb + 2, 3] == 0.0:
+            continue
+        target = vec.load(filled, limb + 2)
+        frame, place = place_limb(model, s, limb, root, target, local, world, segs)
+        pole = pole_of_start(given, limb, vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place))), frame)
         pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
     return judge(lost, residual)
 
 
 @entry
 def solve_plus(
+    table,
+    integers,
+    balls,
+    chords,
+    work,
+    options,
+    points,
+    turned,
+    state,
+    rotations,
+    pelvis,
+    outcome,
+    residual,
+):
+    """Solve F frames in order; see ``SixPointSolver``.
+
+    ``turned`` (F, 6, 4) are measured world rotations, NaN where there is none, or (F, 0, 4).
+    """
+    model = unpack_model(table, integers, balls, chords)
+    s = unpack_settings(options)
+    scratch = unpack_work(work, model.segments.shape[0])
+    rows = state.shape[0] - MEMORY_ROWS
+    local, memory = state[:rows], state[rows:]
+    for f in range(points.shape[0]):
+        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], local, memory, residual[f], scratch)
+        outcome[f, 1] = 1
+        write_frame(model, local, memory, rotations[f], pelvis[f])
+
+
+@entry
+def solve_from_start(
     table,
     integers,
     balls,
@@ -240,18 +286,14 @@ def solve_plus(
     outcome,
     residual,
 ):
-    """Solve F frames in order; see ``SixPointSolver``.
-
-    ``turned`` (F, 6, 4) are measured world rotations, NaN where there is none, or (F, 0, 4); ``given``
-    (F, S + 4, 4) is the pose to start from, see ``start``, or (F, 0, 4).
-    """
+    """Solve F frames, each from a pose ``given`` (F, S + 4, 4), see ``start``."""
     model = unpack_model(table, integers, balls, chords)
     s = unpack_settings(options)
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(
+        outcome[f, 0] = solve_frame_from(
             model, s, points[f], turned[f], given[f], local, memory, residual[f], scratch
         )
         outcome[f, 1] = 1

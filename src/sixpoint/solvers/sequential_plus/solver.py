@@ -16,7 +16,7 @@ from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.errors import SixpointError, TargetError, listed
 from sixpoint.solvers.base import MotionSolution, Progress, Solution
 from sixpoint.solvers.sequential.packing import work_rows
-from sixpoint.solvers.sequential_plus.frame import solve_plus
+from sixpoint.solvers.sequential_plus.frame import solve_from_start, solve_plus
 from sixpoint.solvers.sequential_plus.start import find_start
 from sixpoint.solvers.six_points.model import build_model
 from sixpoint.solvers.six_points.packing import Model
@@ -202,13 +202,15 @@ class SequentialIKPlus(SixPointSolver):
         return self._solve_frames(targets, self._beside(targets, start), progress)
 
     def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
-        """Used rotations (F, 6, 4), NaN where unknown, and the start; (F, 0, 4) where there are none."""
-        nothing = np.empty((len(targets), 0, 4))
-        turned = self._find_rotations(targets) if self.rotations else nothing
+        """Used rotations (F, 6, 4), NaN where unknown, or (F, 0, 4); and the start if there is one."""
+        turned = self._find_rotations(targets) if self.rotations else np.empty((len(targets), 0, 4))
         if start is None:
-            return turned, nothing
+            return (turned,)
         chain = SpineChain.from_figure(self.figure, own_pelvis=True)
         return turned, find_start(self.figure, chain, start, len(targets))
+
+    def _entry_of(self, beside: tuple[Array, ...]) -> Callable[..., None]:
+        return type(self)._entry if len(beside) == 1 else solve_from_start
 
     def _find_rotations(self, targets: Targets) -> Array:
         if targets.rotations is None:

@@ -44,7 +44,7 @@ WITHOUT, WITH = "places", "turns"
 class SequentialIKPrior(SequentialIKPlus):
     """SIK+ whose trunk, elbows and knees begin where a small fitted prior says.
 
-    The prior is a linear map and a network of two small layers, ten thousand numbers in all. What it says
+    The prior is a linear map and a network of two small layers, some 8,500 numbers. What it says
     is a start: the trunk then closes on the head and the limbs on their points, exactly and within the
     limits, as in SIK+. Where the input is unlike what it was fitted on, SIK+'s own start takes over smoothly.
 
@@ -82,7 +82,7 @@ class SequentialIKPrior(SequentialIKPlus):
     def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
         if start is not None:
             raise SixpointError("the prior is the start; SequentialIKPlus takes another one")
-        return super()._beside(targets)[:1]
+        return super()._beside(targets)
 
     def _find_facts(self, model: Model) -> Facts:
         """What the features need of the figure."""

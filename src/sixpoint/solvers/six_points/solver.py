@@ -109,6 +109,10 @@ class SixPointSolver(ABC):
         """
         return self._solve_frame(as_points(points), (), previous, dt)
 
+    def _entry_of(self, beside: tuple[Array, ...]) -> Callable[..., None]:
+        """The compiled entry that reads so many arrays beside the points."""
+        return type(self)._entry
+
     def _solve_frame(
         self, points: Array, beside: tuple[Array, ...], previous: Solution | None, dt: float
     ) -> Solution:
@@ -116,7 +120,7 @@ class SixPointSolver(ABC):
         state = self._state_after(previous)
         rotations, pelvis = np.empty((1, len(self.figure.skeleton), 4)), np.empty((1, 3))
         outcome, residual = np.empty((1, 2), np.int64), np.empty((1, 6))
-        type(self)._entry(
+        self._entry_of(beside)(
             *self._arrays,
             *self._make_work(),
             self._options(dt),
@@ -153,11 +157,11 @@ class SixPointSolver(ABC):
         # Read-only arrays are another type to Numba: one more compilation.
         given = (targets.positions.copy(), *beside)
         fixed = (*self._arrays, *self._make_work(), self._options(1.0 / targets.rate))
-        step = CHUNK if progress else frames
+        entry, step = self._entry_of(beside), CHUNK if progress else frames
         for first in range(0, frames, step):
             part = slice(first, min(first + step, frames))
             out = (rotations[part], pelvis[part], outcome[part], residual[part])
-            type(self)._entry(*fixed, *(array[part] for array in given), state, *out)
+            entry(*fixed, *(array[part] for array in given), state, *out)
             if progress:
                 progress(part.stop)
         moving, translations = self._place(pelvis)
