@@ -1,4 +1,4 @@
-"""Trackers on chest, elbows and knees lead the trunk and the swivel angles; the six effectors are met as ever.
+"""Trackers on chest, elbows and knees lead trunk and swivel angles; the six effectors are met as ever.
 
 A solver that takes a pose to start from (``start=`` of SIK+) is asked twice: its first answer is turned so
 that the chest is where its tracker says, elbows and knees point to theirs, and the second starts there.
@@ -96,11 +96,13 @@ class _Joints:
         self.rotations[joint] = rot.mul(rot.inv(above), self._world[joint])
 
     def carry(self, joints: Sequence[int], *, placed: bool = False) -> None:
-        """Let joints, parents first, follow what they hang on: their places, and unless ``placed`` their turns."""
+        """Let joints, parents first, follow what they hang on; ``placed`` ones keep their world turns."""
         skeleton = self.figure.skeleton
         for joint in joints:
             parent = int(skeleton.parents[joint])
-            self.places[joint] = self.places[parent] + rot.mul_vec(self._world[parent], skeleton.offsets[joint])
+            self.places[joint] = self.places[parent] + rot.mul_vec(
+                self._world[parent], skeleton.offsets[joint]
+            )
             if not placed:
                 self._world[joint] = rot.mul(self._world[parent], self.rotations[joint])
                 self.turns[joint] = rot.mul(self._world[joint], rot.inv(self.figure.neutral[joint]))

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.targets import EFFECTORS, GUIDES
+from sixpoint.body.targets import EFFECTORS, GUIDES, POINTS
 from sixpoint.errors import TargetError
 from sixpoint.live.checks import Checks
 from sixpoint.live.stance import Posture, Stance, about_up, turned
@@ -29,8 +29,6 @@ from sixpoint.signals.one_euro import OneEuro, find_smoothing
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-POINTS = (*EFFECTORS, *GUIDES)
-"""The rows of what trackers report."""
 HELD = 0.3  # a lost point goes on and comes to rest in this time [s]
 COAST = 0.1  # time constant with which its velocity dies away [s]
 AWAY = 1.0  # then it goes to its place without a tracker in this time [s]

@@ -2,8 +2,8 @@
 
 A low-pass filter whose cutoff frequency rises with speed: fc = f_min + beta |v|, with v the velocity, itself
 low-passed. Velocities are vectors, so the result does not depend on the axes, and the noise of a still point
-averages out of them. Weights are alpha = 1 - exp(-2 pi fc dt), which is the paper's 1 / (1 + tau / dt) to first
-order and, unlike it, gives the same course at any frame rate and over uneven time steps.
+averages out of them. Weights are alpha = 1 - exp(-2 pi fc dt), which is the paper's 1 / (1 + tau / dt) to
+first order and, unlike it, gives the same course at any frame rate and over uneven time steps.
 
 Reference: G. Casiez, N. Roussel, D. Vogel, "1 Euro filter: a simple speed-based low-pass filter for noisy
 input in interactive systems", CHI 2012.
@@ -94,7 +94,7 @@ class OneEuro:
         self._points, self._turns = _Memory(3), _Memory(4)
 
     def filter_positions(self, positions: ArrayLike, time: float) -> Array:
-        """Smooth one sample of positions (n, 3) [m] taken at a time [s]; returns (n, 3), NaN where unknown."""
+        """Smooth one sample of positions (n, 3) [m], taken at a time [s]; NaN where unknown."""
         values = np.array(positions, float)
         if self.smoothing is None:
             return values
@@ -148,7 +148,9 @@ class _Memory:
 
     def keep(self, values: Array, smooth: Array, time: float) -> Array:
         """Remember this sample where it is known; returns the smoothed one, NaN where it is not."""
-        known = np.isfinite(smooth).all(axis=1, keepdims=True) & np.isfinite(values).all(axis=1, keepdims=True)
+        known = np.isfinite(smooth).all(axis=1, keepdims=True) & np.isfinite(values).all(
+            axis=1, keepdims=True
+        )
         self.raw = np.where(known, values, self.raw)
         self.smooth = np.where(known, smooth, self.smooth)
         self.time = np.where(known, np.maximum(self.time, time), self.time)
