@@ -18,6 +18,9 @@ EFFECTORS = ("pelvis", "head", "l_wrist", "r_wrist", "l_ankle", "r_ankle")
 GUIDES = ("chest", "l_elbow", "r_elbow", "l_knee", "r_knee")
 """Points that are not met, but lead trunk and swivel angles where they are tracked."""
 
+POINTS = (*EFFECTORS, *GUIDES)
+"""The one order of all that a tracker may be on."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Targets:

@@ -119,7 +119,7 @@ class Checks:
         self._raw = raw
         reported = np.isfinite(raw[:, 0])
         still = reported & (time - self._since > FROZEN)
-        return still & (2 * (reported & ~still).sum() > reported.sum())
+        return np.asarray(still & (2 * (reported & ~still).sum() > reported.sum()), bool)
 
     def _exchange(self, p: Array, q: Array, jumped: Flags, ago: Array) -> tuple[Array, Array, Flags]:
         """Exchange pairs of trackers that jumped to each other's places."""
@@ -155,7 +155,7 @@ class Checks:
         for reason, rows in reasons.items():
             for k in np.flatnonzero(rows):
                 now[k] = now[k] or reason
-        for k, (reason, before) in enumerate(zip(now, self._why, strict=True)):
+        for reason, before in zip(now, self._why, strict=True):
             if reason and reason != before:
                 self.rejected[reason] += 1
         self._why = now

@@ -34,9 +34,9 @@ FOLLOW = 0.3  # time constant with which it follows [s]
 MOST = 1.2  # rad, largest angle between head and body
 TURN = 8.0  # fastest turn of the body [rad/s]
 LINE = 0.1  # shorter lines between wrists and ankles say nothing of the facing [m]
-# How far the pelvis is behind its place when the head is lower than standing: the head's drop over its standing
-# height, and the way back over the figure's height (``Figure.height``). Medians of upright frames with a foot
-# on the floor of CMU 02, 03, 05, 09, 11, 16 and 29 (5800 frames).
+# How far the pelvis is behind its place when the head is lower than standing: the head's drop over its
+# standing height, and the way back over the figure's height (``Figure.height``). Medians of upright frames
+# with a foot on the floor of CMU 02, 03, 05, 09, 11, 16, 29 and 127 (5800 frames).
 DROP = (0.0, 0.04, 0.12, 0.20, 0.28, 0.36)
 BACK = (0.0, 0.02, 0.14, 0.20, 0.28, 0.32)
 LEAST = 0.10  # height of the pelvis over the floor at least, of the stature

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.targets import EFFECTORS, GUIDES
+from sixpoint.body.targets import EFFECTORS, GUIDES, POINTS
 from sixpoint.errors import TargetError
 from sixpoint.live.checks import Checks
 from sixpoint.live.stance import Posture, Stance, about_up, turned
@@ -29,14 +29,13 @@ from sixpoint.signals.one_euro import OneEuro, find_smoothing
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-POINTS = (*EFFECTORS, *GUIDES)
-"""The rows of what trackers report."""
 HELD = 0.3  # a lost point goes on and comes to rest in this time [s]
 COAST = 0.1  # time constant with which its velocity dies away [s]
 AWAY = 1.0  # then it goes to its place without a tracker in this time [s]
 RETURN = 0.15  # a point that returns is eased in [s]
 SIX = len(EFFECTORS)
 IDENTITY = rot.IDENTITY
+LIMBS, OTHERS = np.arange(2, SIX), np.arange(2, len(POINTS))
 SEEN, GUESSED, ALONE = 0, 1, 2  # how a point is placed: as seen, from the body, or by itself
 
 
@@ -128,6 +127,7 @@ class Tracking:
         self._turn_mode = np.zeros(n, bool)
         self._turn_seen, self._turn_changed = self._seen.copy(), self._changed.copy()
         self._turn_held, self._turn_from, self._turn_out = nothing, nothing.copy(), nothing.copy()
+        self._turn_yaw = np.zeros(n)
 
     def recentre(self) -> None:
         """The room was moved: take new places as they come, eased in, without calling them jumps."""
@@ -153,17 +153,15 @@ class Tracking:
         valid = judged.believed
         p = self._filter.filter_positions(np.where(valid[:, None], judged.positions, np.nan), time)
         q = self._filter.filter_rotations(_unit(np.where(valid[:, None], judged.rotations, np.nan)), time)
-        self._turn_seen[np.isfinite(q[:, 3])] = time
         body = self.stance
         body.face(dt, p[:SIX], q[:SIX])
         pelvis, head = self._place_trunk(time, p, valid, judged.moved)
         ankles = np.where(valid[4:SIX, None], p[4:SIX], np.nan)
         places, turns = body.find_limbs(dt, pelvis, head, ankles)
-        rest = np.arange(2, len(POINTS))
-        held = pelvis + turned(body.yaw, self._held[2:])
-        self._place(time, rest, p, valid, judged.moved, held, np.concatenate([places, held[4:]]))
-        facing = about_up(body.yaw)
-        self._turn(time, q, facing, np.vstack([facing, facing, turns, np.tile(facing, (len(GUIDES), 1))]))
+        used = LIMBS if not np.isfinite(self._seen[SIX:]).any() and not valid[SIX:].any() else OTHERS
+        held = pelvis + turned(body.yaw, self._held[used])
+        self._place(time, used, p, valid, judged.moved, held, np.concatenate([places, held[4:]]))
+        self._turn(time, q, turns)
         self._remember(time, valid)
         return self._report(time, valid)
 
@@ -208,37 +206,58 @@ class Tracking:
             held: (m, 3) where they were last in the body's frame [m].
             absent: (m, 3) where they are without a tracker [m]; None where they stay as ``held``.
         """
-        seen, mode = valid[rows], np.where(valid[rows], SEEN, GUESSED if absent is not None else ALONE)
-        alone = (mode == ALONE) & (self._mode[rows] == GUESSED)
-        if alone.any():  # what was found from another point, which is now lost, stays where it is
-            self._from[rows], self._speed[rows] = self._out[rows], 0.0
-            held = self._out[rows]
-        age = time - self._seen[rows]
-        coasted = (COAST * -np.expm1(-age / COAST))[:, None] * self._speed[rows]
-        at_rest = ease(age / HELD)[:, None]
-        place = (1.0 - at_rest) * (self._from[rows] + coasted) + at_rest * held
-        if absent is not None:
-            away = ease((age - HELD) / AWAY)[:, None]
-            place = (1.0 - away) * place + away * absent
-        place = np.where(seen[:, None], p[rows], place)
-        new = ((mode != self._mode[rows]) | moved[rows]) & np.isfinite(self._out[rows, 0])
-        changed = rows[new]
-        self._changed[changed], self._gap[changed] = time, self._out[changed] - place[new]
-        self._mode[rows] = mode
-        left = 1.0 - ease((time - self._changed[rows]) / RETURN)[:, None]
-        self._out[rows] = place + left * self._gap[rows]
+        seen = valid[rows]
+        place, mode = p[rows], np.where(seen, SEEN, ALONE if absent is None else GUESSED)
+        if not seen.all():
+            age = time - self._seen[rows]
+            alone = (mode == ALONE) & (self._mode[rows] == GUESSED)
+            if alone.any():  # what was found from another point, which is now lost, stays where it is
+                self._from[rows], self._speed[rows] = self._out[rows], 0.0
+                held = self._out[rows]
+            coasted = (COAST * -np.expm1(-age / COAST))[:, None] * self._speed[rows]
+            at_rest = ease(age / HELD)[:, None]
+            lost = (1.0 - at_rest) * (self._from[rows] + coasted) + at_rest * held
+            if absent is not None:
+                away = ease((age - HELD) / AWAY)[:, None]
+                lost = (1.0 - away) * lost + away * absent
+            place = np.where(seen[:, None], place, lost)
+        new = (mode != self._mode[rows]) | moved[rows]
+        if new.any():
+            new &= np.isfinite(self._out[rows, 0])
+            changed = rows[new]
+            self._changed[changed], self._gap[changed] = time, self._out[changed] - place[new]
+            self._mode[rows] = mode
+        since = time - self._changed[rows]
+        if since.min() < RETURN:
+            place = place + (1.0 - ease(since / RETURN))[:, None] * self._gap[rows]
+        self._out[rows] = place
 
-    def _turn(self, time: float, q: Array, facing: Array, absent: Array) -> None:
+    def _turn(self, time: float, q: Array, limbs: Array) -> None:
         """Rotations: as seen, else held against the body, and on to those of a body without trackers."""
         seen = np.isfinite(q[:, 3])
-        age = time - self._turn_seen
-        turn = _between(rot.mul(facing, self._turn_held), absent, ease((age - HELD) / AWAY))
-        turn = np.where(seen[:, None], q, turn)
+        turn, yaw = q, self.stance.yaw
+        lost = np.flatnonzero(~seen)
+        if len(lost):
+            turn = q.copy()
+            facing = about_up(yaw)
+            turn[lost] = np.concatenate([[facing, facing], limbs, np.tile(facing, (len(GUIDES), 1))])[lost]
+            known = lost[np.isfinite(self._turn_seen[lost])]
+            if len(known):
+                half = 0.5 * (yaw - self._turn_yaw[known])
+                change = np.zeros((len(known), 4))
+                change[:, 1], change[:, 3] = np.sin(half), np.cos(half)
+                held = rot.mul(change, self._turn_held[known])
+                away = ease((time - self._turn_seen[known] - HELD) / AWAY)
+                turn[known] = _between(held, turn[known], away)
         new = seen != self._turn_mode
-        self._turn_changed[new], self._turn_from[new] = time, self._turn_out[new]
-        self._turn_mode = seen
-        self._turn_out = _between(self._turn_from, turn, ease((time - self._turn_changed) / RETURN))
-        self._turn_held[seen] = rot.mul(rot.inv(facing), self._turn_out[seen])
+        if new.any():
+            self._turn_changed[new], self._turn_from[new] = time, self._turn_out[new]
+            self._turn_mode = seen
+        since = time - self._turn_changed
+        if since.min() < RETURN:
+            turn = _between(self._turn_from, turn, ease(since / RETURN))
+        self._turn_out = turn
+        self._turn_held[seen], self._turn_yaw[seen], self._turn_seen[seen] = turn[seen], yaw, time
 
     def _remember(self, time: float, valid: Flags) -> None:
         """Where seen points are, for when they are lost."""
@@ -251,11 +270,10 @@ class Tracking:
     def _report(self, time: float, valid: Flags) -> Tracked:
         age, ever = time - self._seen, np.isfinite(self._seen)
         state = np.where(valid, State.VALID, np.where(ever, State.LOST, State.ABSENT))
-        since = np.where(np.isfinite(self._changed[SIX:]), (time - self._changed[SIX:]) / RETURN, 1.0)
-        fresh = np.where(valid[SIX:], ease(since), 1.0 - ease(age[SIX:] / HELD))
-        weights = np.where(ever[SIX:], fresh, 0.0)
-        unknown = (weights <= 0.0)[:, None]
         turned_once = np.isfinite(self._turn_seen)
+        since = ease((time - self._changed[SIX:]) / RETURN)
+        weights = np.where(valid[SIX:], since, 1.0 - ease(age[SIX:] / HELD))
+        unknown = (weights <= 0.0)[:, None]
         blank = unknown | ~turned_once[SIX:, None]
         return Tracked(
             positions=self._out[:SIX].copy(),

@@ -2,8 +2,8 @@
 
 A low-pass filter whose cutoff frequency rises with speed: fc = f_min + beta |v|, with v the velocity, itself
 low-passed. Velocities are vectors, so the result does not depend on the axes, and the noise of a still point
-averages out of them. Weights are alpha = 1 - exp(-2 pi fc dt), which is the paper's 1 / (1 + tau / dt) to first
-order and, unlike it, gives the same course at any frame rate and over uneven time steps.
+averages out of them. Weights are alpha = 1 - exp(-2 pi fc dt), which is the paper's 1 / (1 + tau / dt) to
+first order and, unlike it, gives the same course at any frame rate and over uneven time steps.
 
 Reference: G. Casiez, N. Roussel, D. Vogel, "1 Euro filter: a simple speed-based low-pass filter for noisy
 input in interactive systems", CHI 2012.
@@ -15,11 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from sixpoint.errors import TargetError, listed
 
 Array = NDArray[np.float64]
+
+NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
 @dataclass(frozen=True)
@@ -93,21 +94,14 @@ class OneEuro:
         self._points, self._turns = _Memory(3), _Memory(4)
 
     def filter_positions(self, positions: ArrayLike, time: float) -> Array:
-        """Smooth one sample of positions (n, 3) [m] taken at a time [s]; returns (n, 3), NaN where unknown."""
+        """Smooth one sample of positions (n, 3) [m], taken at a time [s]; NaN where unknown."""
         values = np.array(positions, float)
         if self.smoothing is None:
             return values
-        memory, s = self._points, self.smoothing
-        new, rows, dt = memory.take(values, np.isfinite(values).all(axis=1), time)
-        if len(rows):
-            change = values[rows] - memory.raw[rows]
-            alpha = memory.alphas(rows, change, dt, s.cutoff, s.beta, s.speed_cutoff)
-            memory.raw[rows] = values[rows]
-            memory.smooth[rows] += alpha * (values[rows] - memory.smooth[rows])
-        known = new | np.isin(np.arange(len(values)), rows)
-        values[~known] = np.nan
-        values[known] = memory.smooth[known]
-        return values
+        s, m = self.smoothing, self._points
+        dt, old = m.begin(values, time)
+        alpha = m.weigh(values - old, dt, s.cutoff, s.beta, s.speed_cutoff)
+        return m.keep(values, m.smooth + alpha * (values - m.smooth), time)
 
     def filter_rotations(self, rotations: ArrayLike, time: float) -> Array:
         """Smooth one sample of rotations (n, 4) xyzw taken at a time [s], on the sphere (slerp).
@@ -118,24 +112,12 @@ class OneEuro:
         values = np.array(rotations, float)
         if self.smoothing is None:
             return values
-        memory, s = self._turns, self.smoothing
-        length = np.linalg.norm(values, axis=1)
-        good = np.isfinite(length) & (length > 1e-9)
-        values[good] /= length[good, None]
-        new, rows, dt = memory.take(values, good, time)
-        if len(rows):
-            now = Rotation.from_quat(values[rows])
-            turned = (now * Rotation.from_quat(memory.raw[rows]).inv()).as_rotvec()
-            alpha = memory.alphas(rows, turned, dt, s.turn_cutoff, s.turn_beta, s.speed_cutoff)
-            smooth = Rotation.from_quat(memory.smooth[rows])
-            left = (now * smooth.inv()).as_rotvec()
-            memory.raw[rows] = values[rows]
-            memory.smooth[rows] = (Rotation.from_rotvec(alpha * left) * smooth).as_quat()
-        known = new | np.isin(np.arange(len(values)), rows)
-        side = np.where(np.sum(memory.smooth * np.nan_to_num(values), axis=1) < 0, -1.0, 1.0)
-        values[~known] = np.nan
-        values[known] = (memory.smooth * side[:, None])[known]
-        return values
+        length = np.sqrt(np.sum(values * values, axis=1, keepdims=True))
+        values /= np.where((length > 1e-9) & (length < np.inf), length, np.nan)
+        s, m = self.smoothing, self._turns
+        dt, old = m.begin(values, time)
+        alpha = m.weigh(_rotation_vector(values, old), dt, s.turn_cutoff, s.turn_beta, s.speed_cutoff)
+        return m.keep(values, _slerp(m.smooth, values, alpha), time)
 
 
 class _Memory:
@@ -144,27 +126,56 @@ class _Memory:
     def __init__(self, width: int) -> None:
         self.raw = self.smooth = np.empty((0, width))
         self.velocity = np.empty((0, 3))
-        self.time = np.empty(0)
+        self.time = np.empty((0, 1))
 
-    def take(self, values: Array, known: NDArray[np.bool_], time: float) -> tuple[Array, Array, Array]:
-        """Begin rows that are seen first; returns which, indices of the others, and their time steps."""
+    def begin(self, values: Array, time: float) -> tuple[Array, Array]:
+        """Time steps (n, 1) and last samples; a row that is seen first is its own past."""
         if self.raw.shape != values.shape:
             self.raw, self.smooth = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
-            self.velocity, self.time = np.zeros((len(values), 3)), np.full(len(values), -np.inf)
-        new = known & ~np.isfinite(self.time)
-        rows = np.flatnonzero(known & ~new)
-        self.raw[new] = self.smooth[new] = values[new]
-        dt = np.maximum(time - self.time[rows], 0.0)
-        self.time[new] = time
-        self.time[rows] = np.maximum(self.time[rows], time)
-        return new, rows, dt
+            self.velocity, self.time = np.zeros((len(values), 3)), np.full((len(values), 1), -np.inf)
+        new = self.time == -np.inf
+        if new.any():
+            self.smooth = np.where(new, values, self.smooth)
+            return np.where(new, 0.0, np.maximum(time - self.time, 0.0)), np.where(new, values, self.raw)
+        return np.maximum(time - self.time, 0.0), self.raw
 
-    def alphas(
-        self, rows: Array, change: Array, dt: Array, cutoff: float, beta: float, speed_cutoff: float
-    ) -> Array:
-        """(m, 1) weights of the new samples, from how far each changed (m, 3) in ``dt`` (m,)."""
-        now = change / np.maximum(dt, 1e-6)[:, None]
-        weight = compute_alpha(speed_cutoff, dt)[:, None]
-        self.velocity[rows] += weight * (now - self.velocity[rows])
-        speed = np.linalg.norm(self.velocity[rows], axis=1)
-        return compute_alpha(cutoff + beta * speed, dt)[:, None]
+    def weigh(self, change: Array, dt: Array, cutoff: float, beta: float, speed_cutoff: float) -> Array:
+        """(n, 1) weights of the samples, from how far each changed (n, 3) in ``dt`` (n, 1)."""
+        gain = compute_alpha(speed_cutoff, dt) * (change / np.maximum(dt, 1e-6) - self.velocity)
+        self.velocity = self.velocity + np.where(np.isfinite(gain), gain, 0.0)
+        speed = np.sqrt(np.sum(self.velocity * self.velocity, axis=1, keepdims=True))
+        return compute_alpha(cutoff + beta * speed, dt)
+
+    def keep(self, values: Array, smooth: Array, time: float) -> Array:
+        """Remember this sample where it is known; returns the smoothed one, NaN where it is not."""
+        known = np.isfinite(smooth).all(axis=1, keepdims=True) & np.isfinite(values).all(
+            axis=1, keepdims=True
+        )
+        self.raw = np.where(known, values, self.raw)
+        self.smooth = np.where(known, smooth, self.smooth)
+        self.time = np.where(known, np.maximum(self.time, time), self.time)
+        return np.where(known, smooth, np.nan)
+
+
+def _rotation_vector(a: Array, b: Array) -> Array:
+    """(n, 3) the turn from unit quaternions ``b`` to ``a``, in the world [rad]."""
+    av, bv = a[:, :3], b[:, :3]
+    v = b[:, 3:] * av - a[:, 3:] * bv - (av[:, NEXT] * bv[:, LAST] - av[:, LAST] * bv[:, NEXT])
+    w = np.sum(a * b, axis=1, keepdims=True)
+    length = np.sqrt(np.sum(v * v, axis=1, keepdims=True))
+    angle = 2.0 * np.arctan2(length, np.abs(w))
+    return np.asarray(np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(length, 1e-12) * v)
+
+
+def _slerp(a: Array, b: Array, t: Array) -> Array:
+    """Unit quaternions (n, 4) a part ``t`` (n, 1) of the short way from ``a`` to ``b``, on ``b``'s side."""
+    cosine = np.sum(a * b, axis=1, keepdims=True)
+    a = np.where(cosine < 0.0, -a, a)
+    angle = np.arccos(np.minimum(np.abs(cosine), 1.0))
+    sine = np.sin(angle)
+    near = sine < 1e-6
+    divisor = np.where(near, 1.0, sine)
+    first = np.where(near, 1.0 - t, np.sin((1.0 - t) * angle) / divisor)
+    second = np.where(near, t, np.sin(t * angle) / divisor)
+    between = first * a + second * b
+    return np.asarray(between / np.sqrt(np.sum(between * between, axis=1, keepdims=True)))

@@ -1,0 +1,245 @@
+"""A person's profile: lengths, and which tracker sits where, as a small TOML text.
+
+Trackers are known by their serials. Text goes in and out here; files belong to who has them.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.anthropometry import segments_of_stature
+from sixpoint.body.figure import Figure
+from sixpoint.body.targets import POINTS
+from sixpoint.calibration.mounts import Calibration, Mount
+from sixpoint.errors import FormatError, TargetError, listed
+
+Array = NDArray[np.float64]
+
+VERSION = 1
+ROTATION_STD = float(np.radians(5.0))  # where the file does not say
+UNIT = 1e-3  # how far from 1 the length of a rotation may be
+
+
+@dataclass(frozen=True, eq=False)
+class Worn:
+    """One tracker.
+
+    Attributes:
+        point: What it is on, one of ``POINTS`` of ``body.targets``.
+        mount: How it sits there.
+    """
+
+    point: str
+    mount: Mount
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """What is kept of a person.
+
+    Attributes:
+        stature: [m].
+        segments: Segment lengths by name [m]; empty for those of the stature.
+        sources: Where each comes from.
+        trackers: Serial -> what it is on, and how.
+    """
+
+    stature: float
+    segments: dict[str, float] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
+    trackers: dict[str, Worn] = field(default_factory=dict)
+
+    @classmethod
+    def from_calibration(
+        cls, found: Calibration, serials: Mapping[str, str], extra: Mapping[str, Mount] | None = None
+    ) -> Profile:
+        """Keep a calibration.
+
+        Args:
+            found: What ``calibrate`` found.
+            serials: Point -> serial of its tracker.
+            extra: Mounts of chest, elbows and knees; without offset where none is given.
+
+        Raises:
+            TargetError: A point is unknown, or a serial is given twice.
+        """
+        unknown = [point for point in serials if point not in POINTS]
+        if unknown:
+            raise TargetError(f"no points named {listed(unknown)}; there are: {listed(POINTS)}")
+        if len(set(serials.values())) != len(serials):
+            raise TargetError(f"each tracker is on one point; serials: {listed(serials.values())}")
+        plain = Mount(np.zeros(3), rot.IDENTITY)
+        mounts = {**found.mounts, **(extra or {})}
+        worn = {serial: Worn(point, mounts.get(point, plain)) for point, serial in serials.items()}
+        return cls(found.stature, dict(found.segments), dict(found.sources), worn)
+
+    def figure(self) -> Figure:
+        """The built-in figure with these lengths."""
+        return Figure.from_segments(limits=None, **(self.segments or segments_of_stature(self.stature)))
+
+    def serial(self, point: str) -> str | None:
+        """Which tracker is on a point; None without one."""
+        return next((s for s, worn in self.trackers.items() if worn.point == point), None)
+
+    def apply(self, serial: str, position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:
+        """A tracker's reading -> joint position (3,) [m] and segment rotation (4,).
+
+        A part of the mount that is not known is taken as none; without a rotation the tracker is the joint.
+        """
+        mount = self.trackers[serial].mount
+        p, q = np.asarray(position, float), np.asarray(rotation, float)
+        if not np.isfinite(q).all():
+            return p, q
+        offset = np.where(np.isfinite(mount.offset).all(), mount.offset, 0.0)
+        turn = mount.rotation if np.isfinite(mount.rotation).all() else rot.IDENTITY
+        q = rot.normalised(q)
+        return p - rot.mul_vec(q, offset), rot.mul(q, rot.inv(turn))
+
+
+def format_profile(profile: Profile) -> str:
+    """A profile as TOML text; ``parse_profile`` gives it back to the last bit."""
+    lines = [f"version = {VERSION}", f"stature = {_number(profile.stature)}  # [m]"]
+    if profile.segments:
+        lines += ["", "[segments]  # [m]"]
+        lines += [f"{name} = {_number(length)}" for name, length in profile.segments.items()]
+    if profile.sources:
+        lines += ["", "[sources]"]
+        lines += [f"{_key(name)} = {_text(source)}" for name, source in profile.sources.items()]
+    for serial, worn in profile.trackers.items():
+        mount = worn.mount
+        lines += ["", f"[trackers.{_text(serial)}]", f"effector = {_text(worn.point)}"]
+        if np.isfinite(mount.offset).all():
+            lines.append(f"offset = {_numbers(mount.offset)}  # from the joint, in the tracker's frame [m]")
+        if np.isfinite(mount.rotation).all():
+            lines.append(f"rotation = {_numbers(mount.rotation)}  # segment<-tracker, xyzw")
+        if np.isfinite(mount.std):
+            lines.append(f"std = {_number(mount.std)}  # of the offset [m]")
+        if np.isfinite(mount.rotation_std):
+            lines.append(f"rotation_std = {_number(mount.rotation_std)}  # [rad]")
+    return "\n".join(lines) + "\n"
+
+
+def parse_profile(text: str, path: str | Path = "profile") -> Profile:
+    """Read a profile.
+
+    Args:
+        text: TOML.
+        path: Its file, for messages.
+
+    Raises:
+        FormatError: It is not a profile; the message says at which key, what is expected and what is there.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(path, f"not a TOML file: {error}") from error
+    read = _Reader(path)
+    read.only(table, "", ("version", "stature", "segments", "sources", "trackers"))
+    version = table.get("version")
+    if version != VERSION or isinstance(version, bool):
+        raise FormatError(path, "version", expected=f"{VERSION}", got=repr(version))
+    stature = read.number(table, "stature", 0.4, 2.8, "a stature in metres, 0.4 to 2.8")
+    lengths = read.table(table, "segments")
+    known = segments_of_stature(1.75)
+    read.only(lengths, "segments.", known)
+    segments = {n: read.number(lengths, n, 0.005, 2.0, "a length in metres", "segments.") for n in lengths}
+    sources = read.table(table, "sources")
+    for name, source in sources.items():
+        if not isinstance(source, str):
+            raise FormatError(path, f"sources.{name}", expected="a text", got=repr(source))
+    trackers = {serial: _worn(read, serial, entry) for serial, entry in read.table(table, "trackers").items()}
+    points = [worn.point for worn in trackers.values()]
+    twice = [serial for serial, worn in trackers.items() if points.count(worn.point) > 1]
+    if twice:
+        raise FormatError(path, f"trackers {listed(twice)}", expected="one tracker per effector")
+    return Profile(stature, segments, sources, trackers)
+
+
+# --- details -----------------------------------------------------------------------------------------
+
+
+class _Reader:
+    """Values of a table, with the key and what was expected in every complaint."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = path
+
+    def only(self, table: Mapping[str, Any], where: str, known: Sequence[str] | Mapping[str, Any]) -> None:
+        for key in table:
+            if key not in known:
+                raise FormatError(self.path, f"unknown key {where}{key}", expected=f"one of {listed(known)}")
+
+    def table(self, table: Mapping[str, Any], key: str) -> dict[str, Any]:
+        value = table.get(key, {})
+        if not isinstance(value, dict):
+            raise FormatError(self.path, key, expected="a table", got=repr(value))
+        return dict(value)
+
+    def number(
+        self, table: Mapping[str, Any], key: str, low: float, high: float, what: str, where: str = ""
+    ) -> float:
+        value = table.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise FormatError(self.path, f"{where}{key}", expected=what, got=repr(value))
+        return float(value)
+
+    def numbers(self, table: Mapping[str, Any], key: str, size: int, most: float, where: str) -> Array:
+        value = table.get(key)
+        what = f"{size} numbers from {-most:g} to {most:g}"
+        if not isinstance(value, list) or len(value) != size:
+            raise FormatError(self.path, f"{where}{key}", expected=what, got=repr(value))
+        return np.array(
+            [self.number({key: v}, key, -most, most, what, where) for v in value],
+        )
+
+
+def _worn(read: _Reader, serial: str, entry: Any) -> Worn:
+    where = f"trackers.{serial}."
+    if not isinstance(entry, dict):
+        raise FormatError(read.path, where[:-1], expected="a table", got=repr(entry))
+    read.only(entry, where, ("effector", "offset", "rotation", "std", "rotation_std"))
+    point = entry.get("effector")
+    if point not in POINTS:
+        raise FormatError(read.path, f"{where}effector", expected=f"one of {listed(POINTS)}", got=repr(point))
+    offset, turn = np.full(3, np.nan), np.full(4, np.nan)
+    std = rotation_std = float("inf")
+    if "offset" in entry:
+        offset = read.numbers(entry, "offset", 3, 1.0, where)
+    if "rotation" in entry:
+        turn = read.numbers(entry, "rotation", 4, 1.0 + UNIT, where)
+        if abs(np.linalg.norm(turn) - 1.0) > UNIT:
+            raise FormatError(
+                read.path, f"{where}rotation", expected="a unit quaternion xyzw", got=f"{turn.tolist()}"
+            )
+        rotation_std = ROTATION_STD
+    if "std" in entry:
+        std = read.number(entry, "std", 0.0, 10.0, "a standard deviation in metres", where)
+    if "rotation_std" in entry:
+        rotation_std = read.number(entry, "rotation_std", 0.0, 10.0, "a standard deviation in radians", where)
+    return Worn(str(point), Mount(offset, turn, std, rotation_std))
+
+
+def _key(name: str) -> str:
+    return name if name.replace("_", "").isalnum() and name.isascii() else _text(name)
+
+
+def _text(value: str) -> str:
+    """A TOML basic string: JSON's escapes are TOML's, but for DEL."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _numbers(values: Array) -> str:
+    return "[" + ", ".join(_number(v) for v in values) + "]"
