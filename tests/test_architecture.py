@@ -18,11 +18,11 @@ ALLOWED = {
     "signals": {"signals", "errors"},
     "datasets": {"datasets", "errors"},
     "calibration": {"calibration", "signals", "body", "errors"},
-    "live": {"live", "signals", "body", "errors"},
+    "live": {"live", "calibration", "signals", "body", "errors"},
     "solvers": {"solvers", "kernels", "body", "errors"},
     "study": {"study", "signals", "body", "errors"},
     "studies": set(),
-    "jobs": {"jobs", "solvers", "formats", "samples", "datasets", "study", "body", "errors"},
+    "jobs": {"jobs", "live", "solvers", "formats", "samples", "datasets", "study", "body", "errors"},
     "cli": {"cli", "jobs", "study", "solvers", "body", "errors"},
     "__main__": {"cli"},
 }

@@ -19,6 +19,7 @@ from sixpoint.cli.convert import convert
 from sixpoint.cli.data import data
 from sixpoint.cli.demo import demo
 from sixpoint.cli.info import info
+from sixpoint.cli.live import live
 from sixpoint.cli.reconstruct import reconstruct
 from sixpoint.cli.screen import Screen, messages
 from sixpoint.cli.study import study
@@ -35,7 +36,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, compare, convert, info, study, data):
+    for command in (demo, reconstruct, compare, convert, info, live, study, data):
         app.command(command)
     return app
 

@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
+from sixpoint.body.targets import POINTS
 from sixpoint.calibration.mounts import Mount
 from sixpoint.errors import SixpointError, listed
+from sixpoint.live.feet import Floor, level_feet
+from sixpoint.live.guides import solve_guided
 from sixpoint.live.osc import Message
 from sixpoint.live.readings import Packet, Reading
 from sixpoint.live.stance import Posture
-from sixpoint.live.tracking import POINTS, Tracked, Tracking
+from sixpoint.live.tracking import Tracked, Tracking
 
 Array = NDArray[np.float64]
 
@@ -65,6 +68,7 @@ class Session:
         smoothing: "off", "light" or "strong".
         posture: Where legs without trackers are: "standing" or "sitting".
         floor: Height of the floor [m].
+        feet: Level feet that have no measured rotation where they are low.
 
     Attributes:
         counts: What was received, used, dropped and why.
@@ -84,6 +88,7 @@ class Session:
         smoothing: str = "off",
         posture: Posture = "standing",
         floor: float = 0.0,
+        feet: bool = True,
     ) -> None:
         self.figure, self.solver = figure, solver
         self.roles = dict(roles or {})
@@ -96,7 +101,12 @@ class Session:
         self.mounts = dict(mounts or {})
         self.counts: Counter[str] = Counter()
         self.paused = False
-        self._uses_rotations = bool(getattr(solver, "rotations", ()))
+        self.level_feet = feet
+        measured = getattr(solver, "rotations", ())
+        self._measures_feet = np.array(["l_ankle" in measured, "r_ankle" in measured])
+        self._floor = Floor(floor)
+        # Chest, elbows and knees lead a solver that can start from a pose; others meet the six points alone.
+        self._guided = bool(getattr(solver, "takes_start", False))
         self._tracking = Tracking(figure, smoothing=smoothing, posture=posture, floor=floor)
         self.forget()
 
@@ -168,15 +178,23 @@ class Session:
         positions, rotations = self._joints(now)
         tracked = self._tracking.update(now, positions, rotations)
         dt = 0.0 if self._solved_at is None else now - self._solved_at
-        options = {"rotations": tracked.known_rotations} if self._uses_rotations else {}
-        self._solution = self.solver.solve(tracked.positions, previous=self._solution, dt=dt, **options)
+        self._solution = self._pose(tracked, dt)
         self._solved_at = now
         self.counts["poses"] += 1
         thru, self._thru = tuple(self._thru), []
-        self.last = Frame(
-            now, self._solution.pose, tracked, self._solution.residual, tuple(self._passed.values()), thru
-        )
+        pose = self._solution.pose
+        if self.level_feet:
+            known = np.isfinite(tracked.known_rotations[4:, 3]) & self._measures_feet
+            pose = level_feet(self.figure, pose, self._floor, free=(not known[0], not known[1]))
+        self.last = Frame(now, pose, tracked, self._solution.residual, tuple(self._passed.values()), thru)
         return self.last
+
+    def _pose(self, tracked: Tracked, dt: float) -> Any:
+        if self._guided:
+            return solve_guided(self.solver, tracked, self._solution, dt)
+        rotations = getattr(self.solver, "rotations", ())
+        options = {"rotations": tracked.known_rotations} if rotations else {}
+        return self.solver.solve(tracked.positions, previous=self._solution, dt=dt, **options)
 
     def _joints(self, now: float) -> tuple[Array, Array]:
         """Joints and segments from what trackers sent last; NaN where they are silent."""

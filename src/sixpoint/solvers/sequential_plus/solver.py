@@ -132,6 +132,9 @@ class SequentialIKPlus(SixPointSolver):
 
     fitted_on = tuple(f"cmu/{person}" for person in ("02", "03", "05", "09", "11", "16", "29", "127"))
 
+    takes_start: ClassVar[bool] = True
+    """Whether ``solve`` and ``solve_frames`` take a pose to start from."""
+
     _entry: ClassVar[Callable[..., None]] = staticmethod(solve_plus)
 
     def __init__(

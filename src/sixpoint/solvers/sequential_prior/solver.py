@@ -62,6 +62,8 @@ class SequentialIKPrior(SequentialIKPlus):
 
     fitted_on = (*SequentialIKPlus.fitted_on, "mass")
 
+    takes_start = False
+
     _entry = staticmethod(solve_prior)
 
     def __init__(
