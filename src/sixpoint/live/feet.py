@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
-from sixpoint.calibration.model import ANKLE_HEIGHT, Body
+from sixpoint.calibration.model import ANKLE_HEIGHT, stature_of
 from sixpoint.live.stance import about_up, compute_yaw
 from sixpoint.live.stepping import ease
 
@@ -31,15 +31,23 @@ BALL, TOES = 0.07, 0.10  # the ball of the foot and the toe tips before the ankl
 
 @dataclass(frozen=True)
 class Floor:
-    """A level floor.
+    """A level floor under a figure.
 
     Attributes:
-        height: [m].
-        ankle: Height of the ankles over it in standing [m]; None for 0.039 of the stature.
+        stature: Of the figure [m].
+        ankle: Height of its ankles over the floor in standing [m].
+        height: Of the floor [m].
     """
 
+    stature: float
+    ankle: float
     height: float = 0.0
-    ankle: float | None = None
+
+    @classmethod
+    def under(cls, figure: Figure, height: float = 0.0) -> Floor:
+        """The floor under a figure of average proportions, whose ankles are 0.039 of the stature over it."""
+        stature = stature_of(figure)
+        return cls(stature, ANKLE_HEIGHT * stature, height)
 
 
 def level_feet(
@@ -50,16 +58,15 @@ def level_feet(
     Args:
         figure: What is posed.
         pose: A pose of it.
-        floor: Where the floor is.
+        floor: Where the floor is; ``Floor.under(figure)`` by default, which a loop makes once.
         free: Whether the left, the right foot has no measured rotation; others are left alone.
 
     Returns:
         A pose that differs in the ankles' rotations only.
     """
-    floor = floor or Floor()
+    floor = floor or Floor.under(figure)
     places, world = pose.compute_transforms()
-    stature = Body.from_figure(figure).stature
-    stand = floor.ankle if floor.ankle is not None else ANKLE_HEIGHT * stature
+    stature, stand = floor.stature, floor.ankle
     rotations = pose.rotations.copy()
     for knee, ankle, is_free in zip(figure.roles.knee, figure.roles.ankle, free, strict=True):
         if not is_free:
