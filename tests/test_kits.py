@@ -6,20 +6,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from start_poses import POSES, stand
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.figure import Figure
+from sixpoint.body.figure import Figure, SpineChain
+from sixpoint.body.motion import Motion
 from sixpoint.body.targets import EFFECTORS, GUIDES, POINTS
 from sixpoint.calibration.roles import KITS
+from sixpoint.errors import SkeletonError
 from sixpoint.formats import load
 from sixpoint.live.feet import Floor, level_feet
-from sixpoint.live.guides import lead_pose, solve_guided
+from sixpoint.live.guides import Guidance
 from sixpoint.live.stance import Stance, compute_yaw, turned
 from sixpoint.live.stepping import DURATION, FASTEST, LEAD, STRIDE, Stepping, wrap
 from sixpoint.live.tracking import Tracked, Tracking
 from sixpoint.samples import make_sample
 from sixpoint.solvers.sequential_plus.solver import SequentialIKPlus
+from sixpoint.solvers.sequential_plus.start import find_start
+from start_poses import POSES, stand
 
 FIGURE = Figure.from_stature(1.75)
 UP = np.array([0.0, 1.0, 0.0])
@@ -49,16 +52,16 @@ def test_every_kit_makes_a_standing_person_stand(kit, yaw):
 
 @pytest.mark.parametrize("kit", [3, 4, 5, 6, 11])
 def test_a_kit_drives_the_solver(kit):
-    """Head and hands of a walk, and more: every frame converges or says why, feet are on the floor, no NaN."""
+    """Head and hands of a walk, and more: residuals stay small, feet are on the floor, no NaN."""
     motion = make_sample("walk", FIGURE)
     targets, solver = FIGURE.targets(motion), SequentialIKPlus(FIGURE, rotations=EFFECTORS)
     rows = [EFFECTORS.index(n) for n in KITS[kit] if n in EFFECTORS]
     p, q = np.full((len(targets), 6, 3), np.nan), np.full((len(targets), 6, 4), np.nan)
     p[:, rows], q[:, rows] = targets.positions[:, rows], targets.rotations[:, rows]
-    tracking, solution = Tracking(FIGURE), None
+    tracking, guidance, solution = Tracking(FIGURE), Guidance(FIGURE), None
     for k in range(0, len(targets), 4):
         frame = tracking.update(k / 60, p[k], q[k])
-        solution = solve_guided(solver, frame, solution, 1 / 15)
+        solution = guidance.solve(solver, frame, solution, 1 / 15)
         pose = level_feet(FIGURE, solution.pose)
         assert np.isfinite(pose.rotations).all()
         assert solution.residual.max() < 0.15
@@ -125,7 +128,7 @@ def test_yaw_is_that_of_the_gaze_and_steady_when_it_tilts(yaw, pitch, roll):
 
 
 def test_feet_stand_or_step():
-    """A body that walks 3 m: a foot either does not move at all or swings, never both at once, and keeps up."""
+    """A body that walks 3 m: each foot stands or swings, never both at once, and they keep up."""
     steps, at = Stepping(1.75), []
     for k in range(360):
         x = min(max(k - 30, 0) / 90 * 1.2, 3.0)
@@ -161,7 +164,8 @@ def guided(figure, motion, names, rotations=EFFECTORS, every=4):
     chest = [j for j in r.spine if j in figure.skeleton.path(0, r.shoulder[0])][-1]
     joints = [chest, *r.elbow, *r.knee]
     weights = np.array([n in names for n in GUIDES], float)
-    solver, solution, errors = SequentialIKPlus(figure, rotations=rotations), None, []
+    solver, guidance = SequentialIKPlus(figure, rotations=rotations), Guidance(figure)
+    solution, errors = None, []
     for k in range(0, len(targets), every):
         frame = Tracked(
             targets.positions[k],
@@ -173,7 +177,7 @@ def guided(figure, motion, names, rotations=EFFECTORS, every=4):
             anatomical[k, joints],
             weights,
         )
-        solution = solve_guided(solver, frame, solution, every / targets.rate)
+        solution = guidance.solve(solver, frame, solution, every / targets.rate)
         at, turn = solution.pose.compute_transforms()
         off = np.linalg.norm(at[joints] - places[k, joints], axis=1)
         q = rot.mul(rot.mul(turn[chest], rot.inv(figure.neutral[chest])), rot.inv(anatomical[k, chest]))
@@ -199,11 +203,29 @@ def test_guides_help_on_a_recording(data):
     assert led[0] < 0.6 * plain[0] and led[1] < 0.6 * plain[1] and led[2] < 0.6 * plain[2], (plain, led)
 
 
-def test_no_weight_no_change():
-    """A pose that is led by nothing is the pose."""
-    pose = FIGURE.neutral_pose
-    led = lead_pose(FIGURE, pose, np.full((5, 3), np.nan), np.full((5, 4), np.nan), np.ones(5))
-    np.testing.assert_allclose(led.rotations, pose.rotations, atol=1e-12)
+def test_no_guide_no_change():
+    """What leads nothing is what the solver itself reads of the pose."""
+    solver = SequentialIKPlus(FIGURE)
+    points, _ = stand(FIGURE, "crouched")
+    first = solver.solve(points[:6])
+    rows = Guidance(FIGURE).lead(first.pose, np.full((5, 3), np.nan), np.full((5, 4), np.nan), np.ones(5))
+    chain = SpineChain.from_figure(FIGURE, own_pelvis=True)
+    read = find_start(FIGURE, chain, Motion.from_poses([first.pose], 1.0), 1)[0]
+    assert np.abs(np.sum(rows * read, axis=1)).min() > 1 - 1e-12
+    by_rows, by_pose = solver.solve(points[:6], start=rows), solver.solve(points[:6], start=first.pose)
+    np.testing.assert_allclose(by_rows.pose.rotations, by_pose.pose.rotations, atol=1e-9)
+    with pytest.raises(SkeletonError, match="rotations of this figure"):
+        solver.solve(points[:6], start=rows[1:])
+
+
+def test_guides_at_degenerate_places_give_finite_starts():
+    """On the limb's line, at the shoulder, at the pelvis, far away: rotations stay unit quaternions."""
+    pose = SequentialIKPlus(FIGURE).solve(stand(FIGURE, "T-pose")[0][:6]).pose
+    places = pose.compute_transforms()[0]
+    for point in (*places[[FIGURE.roles.shoulder[0], FIGURE.roles.pelvis]], np.array([1e9, 0.0, -1e9])):
+        guides, turns = np.tile(point, (5, 1)), np.tile([0.0, 1.0, 0.0, 0.0], (5, 1))
+        rows = Guidance(FIGURE).lead(pose, guides, turns, np.ones(5))
+        np.testing.assert_allclose(np.linalg.norm(rows, axis=1), 1.0, atol=1e-9)
 
 
 def solved(name):
@@ -227,9 +249,9 @@ def soles(pose):
     return rot.mul_vec(q, UP), np.array(toes)[:, 1]
 
 
-@pytest.mark.parametrize("name", [n for n in POSES])
+@pytest.mark.parametrize("name", list(POSES))
 def test_low_feet_are_flat(name):
-    """Standing, sitting or crouching: soles level within a degree or as far as an ankle goes, toes not below."""
+    """Standing, sitting or crouching: soles are level within a degree, toes not below the floor."""
     pose, _ = solved(name)
     level = level_feet(FIGURE, pose)
     up, toes = soles(level)
@@ -254,6 +276,8 @@ def test_lifted_and_measured_feet_are_left_alone():
 def test_feet_are_levelled_continuously():
     """A pose that is lifted by 2 mm after the other never turns a foot by more than three degrees a step."""
     pose, _ = solved("crouched")
-    turns = [level_feet(FIGURE, pose, Floor.under(FIGURE, -h)).rotations for h in np.arange(-0.05, 0.2, 0.002)]
+    turns = [
+        level_feet(FIGURE, pose, Floor.under(FIGURE, -h)).rotations for h in np.arange(-0.05, 0.2, 0.002)
+    ]
     change = rot.angle(rot.mul(np.array(turns[1:]), rot.inv(np.array(turns[:-1]))))
     assert np.degrees(change.max()) < 3.0

@@ -64,7 +64,7 @@ def test_what_is_seen_passes_unchanged(walk):
 @pytest.mark.parametrize("effector", range(6), ids=EFFECTORS)
 @pytest.mark.parametrize("gap", [0.1, 0.5, 4.0])
 def test_no_effector_jumps_when_a_tracker_vanishes_and_returns(walk, effector, gap):
-    """Steps stay below those of the recording plus 10 gaps per second: the blend's largest slope is 1.5 / 0.15 s."""
+    """Steps stay below twice the recording's plus 10 gaps per second, the blend's largest slope."""
     positions, rotations = walk
     holes, first = positions.copy(), 200
     last = min(first + round(gap * RATE), len(positions) - 40)
@@ -223,7 +223,7 @@ def test_reset_and_recentre_leave_nothing_stale(walk):
 
 
 def test_lost_rotations_are_held_and_eased(walk):
-    """A tracker whose rotation stops keeps it against the body; nothing turns by more than 20 degrees a frame."""
+    """A rotation that stops is kept against the body; nothing turns by more than 20 degrees a frame."""
     positions, rotations = walk
     turns = rotations.copy()
     turns[200:400, 5] = np.nan

@@ -81,7 +81,7 @@ def test_speed_raises_the_cutoff():
 
 
 def test_jitter_shrinks_as_documented():
-    """Noise of 1.5 mm per axis on still points: light leaves less than half of it, strong less than a third."""
+    """Of noise on still points light leaves less than half, strong less than a third."""
     rng = np.random.default_rng(0)
     noisy = rng.normal(0.0, 0.0015, (600, 6, 3))
     left = {}

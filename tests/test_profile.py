@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from start_poses import stand
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
@@ -17,6 +16,7 @@ from sixpoint.calibration.mounts import Mount
 from sixpoint.calibration.profile import Profile, Worn, format_profile, parse_profile
 from sixpoint.errors import FormatError, TargetError
 from sixpoint.samples.range_of_motion import range_of_motion
+from start_poses import stand
 
 TURN = rot.from_axis_angle([0.0, 0.6, 0.8], 1.0)
 

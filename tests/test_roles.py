@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from start_poses import POSES, stand, with_offsets
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import POINTS
 from sixpoint.calibration.roles import KITS, assign_roles, facing_of_rotation, facing_of_step
 from sixpoint.errors import TargetError
+from start_poses import POSES, stand, with_offsets
 
 FIGURES = {h: Figure.from_stature(h) for h in (1.2, 1.45, 1.7, 2.0)}
 
@@ -49,7 +49,7 @@ def test_three_anonymous_trackers_are_right_or_reported(pose):
         points, want, facing = trackers(3, pose, stature, rng)
         found = assign_roles(points, facing=facing)
         assert found.roles == want or not found.certain
-        assert found.certain or pose == "hands in front" and found.open
+        assert found.certain or (pose == "hands in front" and found.open)
 
 
 @pytest.mark.parametrize("pose", POSES)

@@ -210,14 +210,14 @@ def _candidates(points: Array, stances: Stances, head: int | None) -> tuple[Inde
     costs = compute_cost(points[here], stances)
     kept = np.argsort(costs, kind="stable")[:KEPT]
     here, cost = here[kept], costs[kept]
-    tried, known = [here], [cost]
+    visited, known = [here], [cost]
     moves = np.array(_moves(stances.names))
     while True:
         near = here[:, moves]  # (starts, moves, n)
         costs = compute_cost(points[near.reshape(-1, n)], stances).reshape(near.shape[:2])
         if head is not None:
             costs[near[:, :, stances.names.index("head")] != head] = np.inf
-        tried.append(near.reshape(-1, n))
+        visited.append(near.reshape(-1, n))
         known.append(costs.ravel())
         best = costs.argmin(axis=1)
         better = costs.min(axis=1) < cost - 1e-9
@@ -227,7 +227,7 @@ def _candidates(points: Array, stances: Stances, head: int | None) -> tuple[Inde
         cost = np.where(better, costs.min(axis=1), cost)
         here, first = np.unique(here, axis=0, return_index=True)
         cost = cost[first]
-    unique, first = np.unique(np.concatenate(tried), axis=0, return_index=True)
+    unique, first = np.unique(np.concatenate(visited), axis=0, return_index=True)
     return unique, np.concatenate(known)[first]
 
 

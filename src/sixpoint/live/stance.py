@@ -14,6 +14,7 @@ Rules, in the order in which they are applied; lengths are those of the figure:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, exp, sin, sqrt
 from typing import Literal
 
@@ -45,7 +46,7 @@ JUMP = 1.02  # a pelvis above this share of its standing height lifts the feet
 RELAXED = (0.02, 0.045, 0.06)  # relaxed wrists: out, up and forward of hanging straight, of the stature
 
 
-def compute_yaw(q: Array) -> float:
+def compute_yaw(q: Sequence[float] | Array) -> float:
     """Angle about the vertical of a rotation xyzw [rad]: its twist about Y, steady up to upside down."""
     return wrap(2.0 * atan2(q[1], q[3])) if abs(q[1]) + abs(q[3]) > 1e-9 else 0.0
 

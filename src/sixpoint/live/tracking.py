@@ -2,9 +2,9 @@
 
 Readings that can be believed (``checks``) are passed on as they are. A point that is lost goes on at its
 velocity against the body, which dies away, and within 0.3 s it rests where it last was in the body's frame;
-if it stays away it moves, within another second, to where it is taken to be without a tracker (``stance``). One that
-returns is eased in over 0.15 s. So an effector that never had a tracker and one that lost it are the same
-thing, and a kit of three trackers is a set of six of which three were never seen.
+if it stays away it moves, within another second, to where it is taken to be without a tracker (``stance``).
+One that returns is eased in over 0.15 s. So an effector that never had a tracker and one that lost it are the
+same thing, and a kit of three trackers is a set of six of which three were never seen.
 
 Times are arguments; nothing depends on how often ``update`` is called.
 """
