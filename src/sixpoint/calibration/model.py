@@ -7,11 +7,13 @@ lie along the bones, which is where pivots are weakest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.figure import Figure
 from sixpoint.calibration.pivots import Rest
 from sixpoint.calibration.standing import Posture
@@ -49,9 +51,7 @@ class Body:
     @classmethod
     def from_figure(cls, figure: Figure) -> Body:
         """A person whose lengths are known."""
-        mean = Figure.from_stature(1.75)
-        stature = 1.75 * figure.height / mean.height
-        return cls(figure, stature, STD_GIVEN, 0.004, 0.004, 0.008)
+        return cls(figure, stature_of(figure), STD_GIVEN, 0.004, 0.004, 0.008)
 
     @classmethod
     def from_stature(cls, stature: float, found: bool) -> Body:
@@ -95,6 +95,16 @@ class Body:
         ]
         arm, leg = Rest(0.154 * h, 0.05, 0.02), Rest(0.49 * h, 0.05, 0.006)
         return {1: Rest(0.29 * h, 0.04, 0.01, tuple(links)), 2: arm, 3: arm, 4: leg, 5: leg}
+
+
+def stature_of(figure: Figure) -> float:
+    """The stature of an average person whose legs and trunk are as long as the figure's [m]."""
+    return MEAN_STATURE * figure.height / _mean_height()
+
+
+@cache
+def _mean_height() -> float:
+    return Figure.from_stature(MEAN_STATURE).height
 
 
 def _length(figure: Figure, limb: tuple[int, int, int]) -> float:

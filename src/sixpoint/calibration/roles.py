@@ -206,22 +206,29 @@ def _candidates(points: Array, stances: Stances, head: int | None) -> tuple[Inde
         if head is not None:
             tried = tried[tried[:, stances.names.index("head")] == head]
         return tried, compute_cost(points[tried], stances)
-    begun = _beginnings(points, stances, head)
-    costs = compute_cost(points[begun], stances)
-    found = {tuple(a): c for a, c in zip(begun.tolist(), costs.tolist(), strict=True)}
-    moves = _moves(stances.names)
-    for start in begun[np.argsort(costs, kind="stable")[:KEPT]]:
-        here, cost = start, found[tuple(start.tolist())]
-        while True:
-            near = np.array([here[move] for move in moves])
-            if head is not None:
-                near = near[near[:, stances.names.index("head")] == head]
-            costs = compute_cost(points[near], stances)
-            found |= {tuple(a): c for a, c in zip(near.tolist(), costs.tolist(), strict=True)}
-            if costs.min() >= cost - 1e-9:
-                break
-            here, cost = near[costs.argmin()], float(costs.min())
-    return np.array(list(found)), np.array(list(found.values()))
+    here = _beginnings(points, stances, head)
+    costs = compute_cost(points[here], stances)
+    kept = np.argsort(costs, kind="stable")[:KEPT]
+    here, cost = here[kept], costs[kept]
+    visited, known = [here], [cost]
+    moves = np.array(_moves(stances.names))
+    while True:
+        near = here[:, moves]  # (starts, moves, n)
+        costs = compute_cost(points[near.reshape(-1, n)], stances).reshape(near.shape[:2])
+        if head is not None:
+            costs[near[:, :, stances.names.index("head")] != head] = np.inf
+        visited.append(near.reshape(-1, n))
+        known.append(costs.ravel())
+        best = costs.argmin(axis=1)
+        better = costs.min(axis=1) < cost - 1e-9
+        if not better.any():
+            break
+        here = np.where(better[:, None], near[np.arange(len(near)), best], here)
+        cost = np.where(better, costs.min(axis=1), cost)
+        here, first = np.unique(here, axis=0, return_index=True)
+        cost = cost[first]
+    unique, first = np.unique(np.concatenate(visited), axis=0, return_index=True)
+    return unique, np.concatenate(known)[first]
 
 
 def _moves(names: tuple[str, ...]) -> list[list[int]]:

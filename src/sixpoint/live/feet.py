@@ -9,37 +9,42 @@ the floor. A shank that lies, as in kneeling, leaves the foot as it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import asin
+from math import acos, asin, cos, sin
 
-import numpy as np
-from numpy.typing import NDArray
-
-from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
-from sixpoint.calibration.model import ANKLE_HEIGHT, Body
-from sixpoint.live.stance import about_up, compute_yaw
+from sixpoint.calibration.model import ANKLE_HEIGHT, stature_of
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.live.chains import Quaternion, trace
+from sixpoint.live.stance import compute_yaw
 from sixpoint.live.stepping import ease
 
-Array = NDArray[np.float64]
-
-LOW, HIGH = 0.010, 0.085  # ankle over its standing height: flat below the first, free above [of the stature]
+LOW, HIGH = 0.010, 0.060  # ankle over its standing height: flat below the first, free above [of the stature]
 STEEP, LYING = 0.9, 1.4  # rad, a shank's lean from which its foot is let go, and is free
 FLEX = 0.9  # rad, most that an ankle is turned against its shank
-BALL, TOES = 0.07, 0.10  # the ball of the foot and the toe tips before the ankle, of the stature
+TOES = 0.10  # how far the toe tips are before the ankle, of the stature
 
 
 @dataclass(frozen=True)
 class Floor:
-    """A level floor.
+    """A level floor under a figure.
 
     Attributes:
-        height: [m].
-        ankle: Height of the ankles over it in standing [m]; None for 0.039 of the stature.
+        stature: Of the figure [m].
+        ankle: Height of its ankles over the floor in standing [m].
+        height: Of the floor [m].
     """
 
+    stature: float
+    ankle: float
     height: float = 0.0
-    ankle: float | None = None
+
+    @classmethod
+    def under(cls, figure: Figure, height: float = 0.0) -> Floor:
+        """The floor under a figure of average proportions, whose ankles are 0.039 of the stature over it."""
+        stature = stature_of(figure)
+        return cls(stature, ANKLE_HEIGHT * stature, height)
 
 
 def level_feet(
@@ -50,51 +55,43 @@ def level_feet(
     Args:
         figure: What is posed.
         pose: A pose of it.
-        floor: Where the floor is.
+        floor: Where the floor is; ``Floor.under(figure)`` by default, which a loop makes once.
         free: Whether the left, the right foot has no measured rotation; others are left alone.
 
     Returns:
         A pose that differs in the ankles' rotations only.
     """
-    floor = floor or Floor()
-    places, world = pose.compute_transforms()
-    stature = Body.from_figure(figure).stature
-    stand = floor.ankle if floor.ankle is not None else ANKLE_HEIGHT * stature
-    rotations = pose.rotations.copy()
-    for knee, ankle, is_free in zip(figure.roles.knee, figure.roles.ankle, free, strict=True):
+    floor = floor or Floor.under(figure)
+    roles, rotations = figure.roles, pose.rotations.copy()
+    places, world = trace(pose, roles.ankle)
+    for knee, ankle, is_free in zip(roles.knee, roles.ankle, free, strict=True):
         if not is_free:
             continue
-        parent = int(figure.skeleton.parents[ankle])
-        height = float(places[ankle][1]) - floor.height - stand
-        bone = rot.unit(places[knee] - places[ankle])
-        lean = float(np.arccos(np.clip(bone[1], -1.0, 1.0)))
-        now = rot.mul(world[ankle], rot.inv(figure.neutral[ankle]))
-        turn = _level(now, height, lean, stature, stand)
-        rotations[ankle] = rot.mul(rot.inv(world[parent]), rot.mul(turn, figure.neutral[ankle]))
+        neutral = tuple(figure.neutral[ankle].tolist())
+        bone = vec.unit(vec.sub(places[knee], places[ankle]))
+        lean = acos(min(max(bone[1], -1.0), 1.0))
+        now = qt.mul(world[ankle], qt.inv(neutral))
+        turn = _level(now, places[ankle][1] - floor.height - floor.ankle, lean, floor)
+        above = world[int(figure.skeleton.parents[ankle])]
+        rotations[ankle] = qt.inv_mul(above, qt.mul(turn, neutral))
     return Pose(pose.skeleton, rotations, pose.translations, pose.moving)
 
 
-def _level(now: Array, height: float, lean: float, stature: float, stand: float) -> Array:
-    """World rotation of a foot whose ankle is ``height`` over where it stands."""
-    flat = about_up(compute_yaw(now))
-    lift = height / stature
-    weight = 1.0 - float(ease((lift - LOW) / (HIGH - LOW)))
+def _level(now: Quaternion, height: float, lean: float, floor: Floor) -> Quaternion:
+    """World rotation of a foot whose ankle is ``height`` over where it stands [m]."""
+    yaw = compute_yaw(now)
+    flat = (0.0, sin(0.5 * yaw), 0.0, cos(0.5 * yaw))
+    weight = 1.0 - float(ease((height / floor.stature - LOW) / (HIGH - LOW)))
     upright = 1.0 - float(ease((lean - STEEP) / (LYING - STEEP)))
-    turn = _towards(now, flat, weight * upright, FLEX)
-    # The tips of the toes are at least on the floor: a foot that points lower is turned up about its X axis.
-    toes = rot.mul_vec(turn, np.array([0.0, -stand, TOES * stature]))
-    least = -(height + stand)
+    change = qt.mul(flat, qt.inv(now))
+    size = vec.norm(qt.log(change))
+    turn = qt.mul(qt.scaled(change, min(weight * upright, FLEX / max(size, 1e-9))), now)
+    # The tips of the toes are at least on the floor: a foot that points lower is turned up.
+    toes = qt.mul_vec(turn, (0.0, -floor.ankle, TOES * floor.stature))
+    least = -(height + floor.ankle)
     if toes[1] < least and upright > 0.0:
-        reach = float(np.hypot(toes[1], np.hypot(toes[0], toes[2])))
+        reach = vec.norm(toes)
         pitch = asin(min(max(-toes[1] / reach, -1.0), 1.0)) - asin(min(max(-least / reach, -1.0), 1.0))
-        axis = rot.unit(np.array([toes[2], 0.0, -toes[0]]))
-        turn = rot.mul(rot.from_axis_angle(axis, -upright * max(pitch, 0.0)), turn)
-    return turn
-
-
-def _towards(a: Array, b: Array, weight: float, most: float) -> Array:
-    """A rotation on the short way from ``a`` to ``b``, at most so far [rad]."""
-    change = rot.mul(b, rot.inv(a))
-    change = -change if change[3] < 0 else change
-    size = float(rot.angle(change))
-    return rot.mul(rot.from_axis_angle(rot.unit(change[:3]), min(weight * size, most)), a)
+        axis = vec.unit((toes[2], 0.0, -toes[0]))
+        turn = qt.mul(qt.from_axis_angle(axis, -upright * max(pitch, 0.0)), turn)
+    return qt.normalised(turn)  # type: ignore[no-any-return]

@@ -14,6 +14,7 @@ Rules, in the order in which they are applied; lengths are those of the figure:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, exp, sin, sqrt
 from typing import Literal
 
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.calibration.model import ANKLE_HEIGHT, Body
+from sixpoint.calibration.model import ANKLE_HEIGHT, stature_of
 from sixpoint.errors import TargetError
 from sixpoint.live.stepping import Stepping, wrap
 
@@ -38,14 +39,14 @@ LINE = 0.1  # shorter lines between wrists and ankles say nothing of the facing 
 # standing height, and the way back over the figure's height (``Figure.height``). Medians of upright frames
 # with a foot on the floor of CMU 02, 03, 05, 09, 11, 16, 29 and 127 (5800 frames).
 DROP = (0.0, 0.04, 0.12, 0.20, 0.28, 0.36)
-BACK = (0.0, 0.02, 0.14, 0.20, 0.28, 0.32)
+BACK = (0.0, 0.02, 0.14, 0.20, 0.27, 0.31)
 LEAST = 0.10  # height of the pelvis over the floor at least, of the stature
 OVER = 0.45  # share of the trunk's lean by which the feet stand before the pelvis
 JUMP = 1.02  # a pelvis above this share of its standing height lifts the feet
 RELAXED = (0.02, 0.045, 0.06)  # relaxed wrists: out, up and forward of hanging straight, of the stature
 
 
-def compute_yaw(q: Array) -> float:
+def compute_yaw(q: Sequence[float] | Array) -> float:
     """Angle about the vertical of a rotation xyzw [rad]: its twist about Y, steady up to upside down."""
     return wrap(2.0 * atan2(q[1], q[3])) if abs(q[1]) + abs(q[3]) > 1e-9 else 0.0
 
@@ -85,7 +86,7 @@ class Stance:
         roles, rest = figure.roles, figure.rest_positions
         pelvis = rest[roles.pelvis]
         self.posture, self.floor, self.height = posture, floor, figure.height
-        self.stature = Body.from_figure(figure).stature
+        self.stature = stature_of(figure)
         self.ankle = ANKLE_HEIGHT * self.stature
         self._head = rest[roles.head] + figure.head_offset - pelvis
         self._hips = rest[list(roles.hip)] - pelvis
@@ -99,6 +100,7 @@ class Stance:
         self._standing = self.ankle - float(self._ankles[:, 1].mean())  # pelvis over the floor
         self.yaw = 0.0
         self._began = False
+        self._lines = 0  # how many lines told the facing; 3 where rotations did
         self._chord = self._head  # from pelvis to head in the body's frame, as last seen
         self._steps = Stepping(self.stature)
 
@@ -106,8 +108,9 @@ class Stance:
         """Find where the body faces, from known points (6, 3) and rotations (6, 4); NaN where unknown."""
         pelvis, head = rotations[0], rotations[1]
         if pelvis[3] == pelvis[3]:
-            change = wrap(compute_yaw(pelvis) - self.yaw)
+            change, self._lines = wrap(compute_yaw(pelvis) - self.yaw), 3
         elif head[3] == head[3]:
+            self._lines = 3
             off = wrap(compute_yaw(head) - self.yaw)
             beyond = off - min(max(off, -FREE), FREE)
             followed = beyond * (1.0 - exp(-dt / FOLLOW))
@@ -116,8 +119,9 @@ class Stance:
         else:
             lines = [d for d in (points[2] - points[3], points[4] - points[5]) if d[0] == d[0]]
             line = np.sum(lines, axis=0) if lines else np.zeros(3)
-            if line[0] ** 2 + line[2] ** 2 < LINE**2:
-                return self.yaw
+            if len(lines) < self._lines or line[0] ** 2 + line[2] ** 2 < LINE**2:
+                return self.yaw  # fewer than before: what is lost does not turn the body
+            self._lines = len(lines)
             off = wrap(atan2(-line[2], line[0]) - self.yaw)
             change = off * (1.0 - exp(-dt / FOLLOW)) if self._began else off
         if self._began:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 STRIDE = 0.07  # how far a foot may be from its place before it steps, of the stature
-FAR = 3.0  # strides from which on both feet go at once
+FAR = 4.0  # strides from which on both feet go at once
 TURNED = 0.6  # rad, how far the body may turn over a standing foot
 DURATION = 0.25  # of a step [s]
 LIFT = 0.04  # of a step, of the stature

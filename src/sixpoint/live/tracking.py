@@ -1,10 +1,10 @@
 """Six effectors that are always there, from trackers that are not.
 
 Readings that can be believed (``checks``) are passed on as they are. A point that is lost goes on at its
-velocity, which dies away, and within 0.3 s comes to rest where it last was in the body's frame; if it stays
-away it moves, within another second, to where it is taken to be without a tracker (``stance``). One that
-returns is eased in over 0.15 s. So an effector that never had a tracker and one that lost it are the same
-thing, and a kit of three trackers is a set of six of which three were never seen.
+velocity against the body, which dies away, and within 0.3 s it rests where it last was in the body's frame;
+if it stays away it moves, within another second, to where it is taken to be without a tracker (``stance``).
+One that returns is eased in over 0.15 s. So an effector that never had a tracker and one that lost it are the
+same thing, and a kit of three trackers is a set of six of which three were never seen.
 
 Times are arguments; nothing depends on how often ``update`` is called.
 """
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 HELD = 0.3  # a lost point goes on and comes to rest in this time [s]
-COAST = 0.1  # time constant with which its velocity dies away [s]
+COAST = 0.15  # time constant with which its velocity dies away; of 0.05 to 0.3 the best at 0.1 s [s]
 AWAY = 1.0  # then it goes to its place without a tracker in this time [s]
 RETURN = 0.15  # a point that returns is eased in [s]
 SIX = len(EFFECTORS)
@@ -119,14 +119,15 @@ class Tracking:
         self._mode = np.full(n, -1)
         self._seen = np.full(n, -np.inf)  # when the point was last seen
         self._from, self._speed = np.zeros((n, 3)), np.zeros((n, 3))  # where it was then, how fast it moved
-        self._held = np.zeros((n, 3))  # and its place in the body's frame
+        self._held, self._drift = np.zeros((n, 3)), np.zeros((n, 3))  # and both in the body's frame
         self._changed = np.full(n, -np.inf)  # when its mode changed
         self._gap = np.zeros((n, 3))  # and how far it was then from where the new mode has it
         self._out = np.full((n, 3), np.nan)
         nothing = np.tile(IDENTITY, (n, 1))
         self._turn_mode = np.zeros(n, bool)
         self._turn_seen, self._turn_changed = self._seen.copy(), self._changed.copy()
-        self._turn_held, self._turn_from, self._turn_out = nothing, nothing.copy(), nothing.copy()
+        self._turn_held, self._turn_from = nothing, nothing.copy()
+        self._turn_out = np.full((n, 4), np.nan)
         self._turn_yaw = np.zeros(n)
 
     def recentre(self) -> None:
@@ -159,8 +160,8 @@ class Tracking:
         ankles = np.where(valid[4:SIX, None], p[4:SIX], np.nan)
         places, turns = body.find_limbs(dt, pelvis, head, ankles)
         used = LIMBS if not np.isfinite(self._seen[SIX:]).any() and not valid[SIX:].any() else OTHERS
-        held = pelvis + turned(body.yaw, self._held[used])
-        self._place(time, used, p, valid, judged.moved, held, np.concatenate([places, held[4:]]))
+        absent = np.concatenate([places, np.full((len(used) - 4, 3), np.nan)])
+        self._place(time, used, p, valid, judged.moved, pelvis, absent)
         self._turn(time, q, turns)
         self._remember(time, valid)
         return self._report(time, valid)
@@ -174,13 +175,12 @@ class Tracking:
             first, other = 0, 1
         else:
             first, other = 1, 0
-        rows = np.array([first])
-        stay = self._from[rows] if seen[first] else body.nowhere()[None]
-        self._place(time, rows, p, valid, moved, stay + COAST * self._speed[rows], None)
+        if not seen[first]:
+            self._from[first] = body.nowhere()
+        self._place(time, np.array([first]), p, valid, moved, None, None)
         known = self._out[first]
         other_place = body.find_head(known) if other == 1 else body.find_pelvis(known)
-        held = known + turned(body.yaw, self._held[other])
-        self._place(time, np.array([other]), p, valid, moved, held[None], other_place[None])
+        self._place(time, np.array([other]), p, valid, moved, known, other_place[None])
         if valid[0] and valid[1]:
             body.remember(self._out[0], self._out[1])
         return self._out[0], self._out[1]
@@ -192,7 +192,7 @@ class Tracking:
         p: Array,
         valid: Flags,
         moved: Flags,
-        held: Array,
+        base: Array | None,
         absent: Array | None,
     ) -> None:
         """Outputs of some rows: as seen, else going on, held, and on to where they are without a tracker.
@@ -203,23 +203,25 @@ class Tracking:
             p: (n, 3) what is seen [m].
             valid: (n,) whether it is.
             moved: (n,) whether the room was moved.
-            held: (m, 3) where they were last in the body's frame [m].
-            absent: (m, 3) where they are without a tracker [m]; None where they stay as ``held``.
+            base: (3,) the point that they are held to; None where they are by themselves.
+            absent: (m, 3) where they are without a tracker [m]; NaN where they stay.
         """
         seen = valid[rows]
-        place, mode = p[rows], np.where(seen, SEEN, ALONE if absent is None else GUESSED)
+        place, mode = p[rows], np.where(seen, SEEN, ALONE if base is None else GUESSED)
         if not seen.all():
             age = time - self._seen[rows]
             alone = (mode == ALONE) & (self._mode[rows] == GUESSED)
             if alone.any():  # what was found from another point, which is now lost, stays where it is
                 self._from[rows], self._speed[rows] = self._out[rows], 0.0
-                held = self._out[rows]
-            coasted = (COAST * -np.expm1(-age / COAST))[:, None] * self._speed[rows]
-            at_rest = ease(age / HELD)[:, None]
-            lost = (1.0 - at_rest) * (self._from[rows] + coasted) + at_rest * held
+            coasted = (COAST * -np.expm1(-age / COAST))[:, None]
+            if base is None:
+                lost = self._from[rows] + coasted * self._speed[rows]
+            else:
+                coasted *= 1.0 - ease(age / HELD)[:, None]
+                lost = base + turned(self.stance.yaw, self._held[rows] + coasted * self._drift[rows])
             if absent is not None:
-                away = ease((age - HELD) / AWAY)[:, None]
-                lost = (1.0 - away) * lost + away * absent
+                away = np.where(np.isnan(absent), 0.0, ease((age - HELD) / AWAY)[:, None])
+                lost = lost + away * (np.nan_to_num(absent) - lost)
             place = np.where(seen[:, None], place, lost)
         new = (mode != self._mode[rows]) | moved[rows]
         if new.any():
@@ -251,6 +253,7 @@ class Tracking:
                 turn[known] = _between(held, turn[known], away)
         new = seen != self._turn_mode
         if new.any():
+            new &= np.isfinite(self._turn_out[:, 3])
             self._turn_changed[new], self._turn_from[new] = time, self._turn_out[new]
             self._turn_mode = seen
         since = time - self._turn_changed
@@ -262,10 +265,15 @@ class Tracking:
     def _remember(self, time: float, valid: Flags) -> None:
         """Where seen points are, for when they are lost."""
         self._seen[valid] = time
-        self._from[valid], self._speed[valid] = self._out[valid], self.checks.velocity[valid]
-        base = np.repeat(self._out[:1], len(POINTS), axis=0)
+        velocity = self.checks.velocity
+        self._from[valid], self._speed[valid] = self._out[valid], velocity[valid]
+        base, moves = np.repeat(self._out[:1], len(POINTS), axis=0), np.zeros((len(POINTS), 3))
         base[0] = self._out[1]
+        if valid[0] or valid[1]:
+            moves[:] = velocity[0] if valid[0] else velocity[1]
+            moves[0] = velocity[1] if valid[1] else 0.0
         self._held[valid] = turned(-self.stance.yaw, (self._out - base)[valid])
+        self._drift[valid] = turned(-self.stance.yaw, (velocity - moves)[valid])
 
     def _report(self, time: float, valid: Flags) -> Tracked:
         age, ever = time - self._seen, np.isfinite(self._seen)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sixpoint.body.figure import COINCIDENT, Figure, SpineChain
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import EFFECTORS, Targets, as_points
-from sixpoint.errors import SixpointError, TargetError, listed
+from sixpoint.errors import SixpointError, SkeletonError, TargetError, listed
 from sixpoint.solvers.base import MotionSolution, Progress, Solution
 from sixpoint.solvers.sequential.packing import work_rows
 from sixpoint.solvers.sequential_plus.frame import solve_from_start, solve_plus
@@ -164,7 +164,7 @@ class SequentialIKPlus(SixPointSolver):
         dt: float = 1 / 60,
         *,
         rotations: ArrayLike | None = None,
-        start: Pose | None = None,
+        start: Pose | ArrayLike | None = None,
     ) -> Solution:
         """Pose the figure for one frame.
 
@@ -175,7 +175,8 @@ class SequentialIKPlus(SixPointSolver):
             rotations: (6, 4) their world rotations xyzw, identity in the neutral pose; NaN where unknown.
                 Only those of ``self.rotations`` are read, and they must be given.
             start: A pose of the rig to start from in place of the method's own start: the trunk as it is
-                there closes on the head, elbows and knees point where they do there.
+                there closes on the head, elbows and knees point where they do there. Or what is read of it,
+                (S + 4, 4), see ``start.find_start``, which is faster.
 
         Raises:
             TargetError: ``points`` or ``rotations`` has another shape, or asked-for rotations are missing.
@@ -184,7 +185,10 @@ class SequentialIKPlus(SixPointSolver):
         """
         frame = as_points(points)
         given = None if rotations is None else np.asarray(rotations, float)[None]
-        pose = None if start is None else Motion.from_poses([start], 1.0)
+        if isinstance(start, Pose):
+            pose: Motion | Array | None = Motion.from_poses([start], 1.0)
+        else:
+            pose = None if start is None else np.array(start, float, order="C")[None]
         return self._solve_frame(frame, self._beside(Targets(frame[None], 1.0, given), pose), previous, dt)
 
     def solve_frames(
@@ -204,11 +208,17 @@ class SequentialIKPlus(SixPointSolver):
         """
         return self._solve_frames(targets, self._beside(targets, start), progress)
 
-    def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
+    def _beside(self, targets: Targets, start: Motion | Array | None = None) -> tuple[Array, ...]:
         """Used rotations (F, 6, 4), NaN where unknown, or (F, 0, 4); and the start if there is one."""
         turned = self._find_rotations(targets) if self.rotations else np.empty((len(targets), 0, 4))
         if start is None:
             return (turned,)
+        if isinstance(start, np.ndarray):
+            if start.shape != (len(targets), self._trunk + 4, 4) or not np.isfinite(start).all():
+                raise SkeletonError(
+                    f"the start is a pose or {self._trunk + 4} rotations of this figure, got {start.shape}"
+                )
+            return turned, start
         chain = SpineChain.from_figure(self.figure, own_pelvis=True)
         return turned, find_start(self.figure, chain, start, len(targets))
 

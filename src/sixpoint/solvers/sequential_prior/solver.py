@@ -81,7 +81,7 @@ class SequentialIKPrior(SequentialIKPlus):
     def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
         return (*super()._lower(model), pack_facts(self._find_facts(model)), *self._networks)
 
-    def _beside(self, targets: Targets, start: Motion | None = None) -> tuple[Array, ...]:
+    def _beside(self, targets: Targets, start: Motion | Array | None = None) -> tuple[Array, ...]:
         if start is not None:
             raise SixpointError("the prior is the start; SequentialIKPlus takes another one")
         return super()._beside(targets)
