@@ -141,8 +141,8 @@ def measure_avatars(count: int, seconds: float) -> None:
     poses = [c.statistics.poses for c in channels]
     late = max(1e3 * c.statistics.percentile("latency", 99) for c in channels)
     print(
-        f"{count} avatars: {min(poses)} to {max(poses)} poses for {sets} sets each; latency p99 {late:.2f} ms "
-        f"at most; {100 * busy:.0f} % of a core"
+        f"{count} avatars: {min(poses)} to {max(poses)} poses for {sets} sets each; latency p99 {late:.2f} "
+        f"ms at most; {100 * busy:.0f} % of a core"
     )
 
 

@@ -53,8 +53,8 @@ def live(
     """Pose an avatar live from trackers that arrive over the network.
 
     A tracker whose serial is pelvis, head, l_wrist, r_wrist, l_ankle or r_ankle (or chest, l_elbow, r_elbow,
-    l_knee, r_knee) plays that role; a headset is the head. What has no tracker is filled in. Solves as soon as
-    a set of trackers is complete.
+    l_knee, r_knee) plays that role; a headset is the head. What has no tracker is filled in. Solves as soon
+    as a set of trackers is complete.
 
     For example:
 

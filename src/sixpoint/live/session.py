@@ -21,7 +21,7 @@ from sixpoint.body.targets import POINTS
 from sixpoint.calibration.mounts import Mount
 from sixpoint.errors import SixpointError, listed
 from sixpoint.live.feet import Floor, level_feet
-from sixpoint.live.guides import solve_guided
+from sixpoint.live.guides import Guidance
 from sixpoint.live.osc import Message
 from sixpoint.live.readings import Packet, Reading
 from sixpoint.live.stance import Posture
@@ -104,9 +104,9 @@ class Session:
         self.level_feet = feet
         measured = getattr(solver, "rotations", ())
         self._measures_feet = np.array(["l_ankle" in measured, "r_ankle" in measured])
-        self._floor = Floor(floor)
+        self._floor = Floor.under(figure, floor)
         # Chest, elbows and knees lead a solver that can start from a pose; others meet the six points alone.
-        self._guided = bool(getattr(solver, "takes_start", False))
+        self._guidance = Guidance(figure) if getattr(solver, "takes_start", False) else None
         self._tracking = Tracking(figure, smoothing=smoothing, posture=posture, floor=floor)
         self.forget()
 
@@ -190,8 +190,8 @@ class Session:
         return self.last
 
     def _pose(self, tracked: Tracked, dt: float) -> Any:
-        if self._guided:
-            return solve_guided(self.solver, tracked, self._solution, dt)
+        if self._guidance is not None:
+            return self._guidance.solve(self.solver, tracked, self._solution, dt)
         rotations = getattr(self.solver, "rotations", ())
         options = {"rotations": tracked.known_rotations} if rotations else {}
         return self.solver.solve(tracked.positions, previous=self._solution, dt=dt, **options)
