@@ -22,8 +22,19 @@ ALLOWED = {
     "live": {"live", "calibration", "signals", "kernels", "body", "errors"},
     "study": {"study", "signals", "body", "errors"},
     "studies": set(),
-    "jobs": {"jobs", "live", "solvers", "formats", "samples", "datasets", "study", "body", "errors"},
-    "cli": {"cli", "jobs", "study", "solvers", "body", "errors"},
+    "jobs": {
+        "jobs",
+        "live",
+        "calibration",
+        "solvers",
+        "formats",
+        "samples",
+        "datasets",
+        "study",
+        "body",
+        "errors",
+    },
+    "cli": {"cli", "jobs", "live", "study", "solvers", "body", "errors"},
     "__main__": {"cli"},
 }
 """Room -> rooms it may import."""

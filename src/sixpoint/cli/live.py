@@ -5,14 +5,17 @@ from __future__ import annotations
 import queue
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from sixpoint.cli.options import Force
 from sixpoint.cli.screen import Screen
 
-KEYS = "p pause, r recentre, n begin anew, q quit (and Enter)"
+KEYS = "p pause, r recentre, c calibrate, n begin anew, q quit (and Enter)"
+WAIT = 3.0  # s, before a calibration begins
 
 
 def live(
@@ -48,7 +51,12 @@ def live(
         float, Parameter(help="Poses a second that a timer keeps up where packets do not [Hz].")
     ] = 90.0,
     duration: Annotated[float | None, Parameter(help="Seconds; until stopped by default.")] = None,
+    profile: Annotated[Path | None, Parameter(help="Profile of the person; --calibrate writes it.")] = None,
+    calibrate: Annotated[
+        bool, Parameter(negative="", help="Find roles, mounts and lengths first: stand still, then move.")
+    ] = False,
     record: Annotated[Path | None, Parameter(help="Record all that arrives to this file.")] = None,
+    force: Force = False,
 ) -> None:
     """Pose an avatar live from trackers that arrive over the network.
 
@@ -62,10 +70,21 @@ def live(
     sixpoint live --vmc-in 39540 --vmc-out 127.0.0.1:39539
     sixpoint live --vrchat-in 9000 --vmc-out 39539 --smoothing light
     sixpoint live --plain-in 5005 --vrchat-out 9000 --record take.jsonl
+    sixpoint live --vmc-in 39540 --vmc-out 39539 --profile me.toml --calibrate
     ```
     """
     from sixpoint.errors import SixpointError
-    from sixpoint.jobs.live import VMC_IN, VMC_OUT, VRCHAT_OUT, Live, parse_address, parse_rotations
+    from sixpoint.jobs.live import (
+        VMC_IN,
+        VMC_OUT,
+        VRCHAT_OUT,
+        Live,
+        mounts_of,
+        parse_address,
+        parse_rotations,
+        roles_of,
+    )
+    from sixpoint.live.calibrating import Calibrating
 
     screen = Screen()
     inputs = {"vmc": vmc_in, "vrchat": vrchat_in, "plain": plain_in}
@@ -87,7 +106,14 @@ def live(
         posture=posture,
         rate=rate,
         record=record,
+        profile=profile,
     )
+    if profile is None and calibrate:
+        raise SixpointError("say with --profile FILE where to keep the calibration")
+    if profile is not None and not calibrate and not profile.exists():
+        raise SixpointError(f"{profile} does not exist; --calibrate makes it")
+    if calibrate and profile is not None and profile.exists() and not force:
+        raise SixpointError(f"{profile} exists; use --force to calibrate anew")
     loop = settings.make_loop()
     channel = loop.channels[0]
     screen.say(f"listening for {protocol} on {host}:{channel.port}; {KEYS}")
@@ -99,6 +125,9 @@ def live(
     if sys.stdin is not None and sys.stdin.isatty():
         threading.Thread(target=_read_keys, args=(keys,), daemon=True).start()
     told = 0.0
+    said = ""
+    if calibrate:
+        channel.calibrating = Calibrating(time.perf_counter() + WAIT)
 
     def tick(elapsed: float) -> None:
         nonlocal told
@@ -110,11 +139,42 @@ def live(
                 channel.session.recentre()
             elif key == "n":
                 channel.session.forget()
+            elif key == "c":
+                channel.calibrating = Calibrating(time.perf_counter())
             elif key == "q":
                 loop.stop()
+        if channel.calibrating is not None:
+            calibrate_on()
         if elapsed - told >= 5.0:
             told = elapsed
             screen.say(channel.statistics.line())
+
+    def calibrate_on() -> None:
+        nonlocal said
+        going, now = channel.calibrating, time.perf_counter()
+        assert going is not None
+        line = going.say(now)
+        if line.split("(")[0] != said:
+            said = line.split("(")[0]
+            screen.say(line)
+        if not going.take(now, channel.session.seen):
+            return
+        channel.calibrating = None
+        try:
+            outcome = going.finish()
+            settings.keep_profile(outcome.profile, force=True)
+        except SixpointError as error:
+            screen.note(str(error), "warning", "yellow")
+            return
+        for note in outcome.notes:
+            screen.note(note)
+        fresh = settings.make_session() if profile is not None else None
+        if fresh is not None:
+            channel.session, channel.outputs = fresh, settings.make_outputs(fresh)
+            screen.say(f"calibrated: {profile}")
+        else:
+            channel.session.wear(roles_of(outcome.profile), mounts_of(outcome.profile))
+            screen.say("calibrated; give --profile FILE to keep it")
 
     try:
         loop.run(duration, tick)
@@ -126,7 +186,9 @@ def live(
             loop.recorder.close()
     screen.say(channel.statistics.line())
     counts = {**channel.session.counts, **channel.statistics.counts}
-    screen.rows([(what, str(n)) for what, n in sorted(counts.items()) if n])
+    rows = [(what, str(n)) for what, n in sorted(counts.items()) if n]
+    if rows:
+        screen.rows(rows)
 
 
 def _read_keys(keys: queue.SimpleQueue[str]) -> None:

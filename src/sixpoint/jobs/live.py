@@ -7,9 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import EFFECTORS
-from sixpoint.errors import SixpointError
+from sixpoint.calibration.mounts import Mount
+from sixpoint.calibration.profile import Profile, format_profile, parse_profile
+from sixpoint.errors import FormatError, SixpointError
+from sixpoint.formats.atomic import write_files
 from sixpoint.live.loop import Channel, LiveLoop, Output
 from sixpoint.live.record import RecordingWriter
 from sixpoint.live.session import Frame, Session
@@ -40,6 +45,7 @@ class Live:
         floor: Height of the floor [m].
         rate: Poses a second that the timer keeps up [Hz].
         record: File to record all datagrams to.
+        profile: A person's profile, as a calibration writes it; it need not be there yet.
     """
 
     protocol: str = "vmc"
@@ -56,6 +62,7 @@ class Live:
     floor: float = 0.0
     rate: float = 90.0
     record: Path | None = None
+    profile: Path | None = None
 
     def make_session(self) -> Session:
         """The session, its kernels compiled.
@@ -63,25 +70,56 @@ class Live:
         Raises:
             SixpointError: A setting is impossible; the message says what would work.
         """
-        figure = Figure.from_stature(self.stature)
+        known = self.read_profile()
+        figure = Figure.from_stature(self.stature) if known is None else known.figure()
         options: dict[str, object] = {} if self.limits else {"limits": False}
-        if self.rotations:
+        rotations = self.rotations
+        if known is not None and "rotations" in find_options(find_solver(self.method)):
+            turned = {w.point for w in known.trackers.values() if np.isfinite(w.mount.rotation).all()}
+            rotations = rotations or tuple(name for name in EFFECTORS if name in turned)
+        if rotations:
             if "rotations" not in find_options(find_solver(self.method)):
                 raise SixpointError(f"{self.method} uses no rotations; sik+ and sik-prior do")
-            options["rotations"] = self.rotations
+            options["rotations"] = rotations
         solver = make_solver(self.method, figure, **options)
-        session = Session(figure, solver, smoothing=self.smoothing, posture=self.posture, floor=self.floor)
+        session = Session(
+            figure,
+            solver,
+            roles=None if known is None else roles_of(known),
+            mounts=None if known is None else mounts_of(known),
+            smoothing=self.smoothing,
+            posture=self.posture,
+            floor=self.floor,
+        )
         solver.warm_up()
         return session
 
-    def make_loop(self, watch: Callable[[Channel, Frame], None] | None = None) -> LiveLoop:
-        """The loop, its port open.
+    def read_profile(self) -> Profile | None:
+        """The profile, if there is a file.
 
         Raises:
-            SixpointError: A setting is impossible, a port in use, or the recording exists.
+            FormatError: It is no profile.
         """
-        session = self.make_session()
-        outputs = []
+        if self.profile is None or not self.profile.exists():
+            return None
+        try:
+            text = self.profile.read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FormatError(self.profile, f"cannot be read: {error}") from error
+        return parse_profile(text, self.profile)
+
+    def keep_profile(self, profile: Profile, *, force: bool = False) -> None:
+        """Write a calibration's profile.
+
+        Raises:
+            FormatError: The file exists and ``force`` is not given, or it cannot be written.
+        """
+        if self.profile is not None:
+            write_files({self.profile: format_profile(profile).encode()}, force)
+
+    def make_outputs(self, session: Session) -> list[Output]:
+        """What sends the poses of a session to the receivers."""
+        outputs: list[Output] = []
         if self.vmc_out:
             performer, start = PerformerWriter(session.figure), time.perf_counter()
 
@@ -95,9 +133,28 @@ class Live:
             outputs += [
                 Output(address, lambda frame: trackers.write_pose(frame.pose)) for address in self.vrchat_out
             ]
-        channel = Channel(session, self.protocol, self.port, self.host, outputs)
+        return outputs
+
+    def make_loop(self, watch: Callable[[Channel, Frame], None] | None = None) -> LiveLoop:
+        """The loop, its port open.
+
+        Raises:
+            SixpointError: A setting is impossible, a port in use, or the recording exists.
+        """
+        session = self.make_session()
+        channel = Channel(session, self.protocol, self.port, self.host, self.make_outputs(session))
         recorder = None if self.record is None else RecordingWriter(self.record)
         return LiveLoop([channel], rate=self.rate, recorder=recorder, watch=watch)
+
+
+def roles_of(profile: Profile) -> dict[str, str]:
+    """Serial -> point."""
+    return {serial: worn.point for serial, worn in profile.trackers.items()}
+
+
+def mounts_of(profile: Profile) -> dict[str, Mount]:
+    """Point -> mount."""
+    return {worn.point: worn.mount for worn in profile.trackers.values()}
 
 
 def parse_address(text: str, port: int) -> tuple[str, int]:

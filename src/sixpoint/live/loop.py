@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 from sixpoint.errors import PacketError, SixpointError
 from sixpoint.live import plain, vmc, vrchat
+from sixpoint.live.calibrating import Calibrating
 from sixpoint.live.readings import Packet
 from sixpoint.live.record import Datagram, RecordingWriter
 from sixpoint.live.session import Frame, Session
@@ -60,6 +61,7 @@ class Channel:
         host: Address to listen on.
         outputs: Where poses are sent.
         statistics: How it goes.
+        calibrating: A calibration that is going on; it gets all that arrives.
     """
 
     session: Session
@@ -72,6 +74,7 @@ class Channel:
     sender: tuple[str, int] | None = None
     heard: float = float("-inf")
     posed: float = float("-inf")
+    calibrating: Calibrating | None = None
 
 
 class LiveLoop:
@@ -179,7 +182,10 @@ class LiveLoop:
             statistics.drop(str(error))
             return False
         channel.sender, channel.heard = source, now
-        return channel.session.receive(packet, now)
+        complete = channel.session.receive(packet, now)
+        if channel.calibrating is not None:
+            channel.calibrating.take(now, channel.session.seen)
+        return complete
 
     def _pose(self, channel: Channel, now: float, arrived: float | None) -> None:
         frame = channel.session.solve(now)

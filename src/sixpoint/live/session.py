@@ -91,14 +91,7 @@ class Session:
         feet: bool = True,
     ) -> None:
         self.figure, self.solver = figure, solver
-        self.roles = dict(roles or {})
-        unknown = sorted({name for name in (*self.roles.values(), *(mounts or {})) if name not in POINTS})
-        if unknown:
-            raise SixpointError(f"no role named {listed(unknown)}; roles: {listed(POINTS)}")
-        twice = [name for name, n in Counter(self.roles.values()).items() if n > 1]
-        if twice:
-            raise SixpointError(f"two trackers have the role {listed(twice)}")
-        self.mounts = dict(mounts or {})
+        self.roles, self.mounts = _checked(roles or {}, mounts or {})
         self.counts: Counter[str] = Counter()
         self.paused = False
         self.level_feet = feet
@@ -123,6 +116,11 @@ class Session:
         self._solution: Any = None
         self._solved_at: float | None = None
         self.last: Frame | None = None
+
+    def wear(self, roles: Mapping[str, str], mounts: Mapping[str, Mount]) -> None:
+        """Take new roles and mounts, as after a calibration, and begin anew."""
+        self.roles, self.mounts = _checked(roles, mounts)
+        self.forget()
 
     def recentre(self) -> None:
         """The tracking space was moved: take new places as they come, without calling them jumps."""
@@ -203,8 +201,22 @@ class Session:
         positions[stale], rotations[stale] = np.nan, np.nan
         for name, mount in self.mounts.items():
             row = POINTS.index(name)
+            if not np.isfinite(rotations[row]).all():
+                continue  # a tracker without rotation is taken to be the joint
             if np.isfinite(mount.offset).all():
                 positions[row] -= rot.mul_vec(rotations[row], mount.offset)
             if np.isfinite(mount.rotation).all():
                 rotations[row] = rot.mul(rotations[row], rot.inv(mount.rotation))
         return positions, rotations
+
+
+def _checked(
+    roles: Mapping[str, str], mounts: Mapping[str, Mount]
+) -> tuple[dict[str, str], dict[str, Mount]]:
+    unknown = sorted({name for name in (*roles.values(), *mounts) if name not in POINTS})
+    if unknown:
+        raise SixpointError(f"no role named {listed(unknown)}; roles: {listed(POINTS)}")
+    twice = [name for name, n in Counter(roles.values()).items() if n > 1]
+    if twice:
+        raise SixpointError(f"two trackers have the role {listed(twice)}")
+    return dict(roles), dict(mounts)

@@ -69,6 +69,8 @@ class Statistics:
 
     def line(self) -> str:
         """One line for the terminal."""
+        if not self.poses:
+            return f"nothing arrived, {self.dropped} packets dropped" if self.dropped else "nothing arrived"
         solving, latency = (1e3 * self.percentile(w, p) for w, p in (("solving", 50), ("latency", 99)))
         text = f"{self.rate:5.1f} poses/s, solving {solving:.2f} ms, latency p99 {latency:.2f} ms"
         return f"{text}, {self.dropped} packets dropped" if self.dropped else text
