@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +14,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure, SpineChain
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import EFFECTORS, GUIDES, POINTS
+from sixpoint.calibration.profile import parse_profile
 from sixpoint.calibration.roles import KITS
 from sixpoint.errors import SkeletonError
 from sixpoint.formats import load
@@ -281,3 +285,13 @@ def test_feet_are_levelled_continuously():
     ]
     change = rot.angle(rot.mul(np.array(turns[1:]), rot.inv(np.array(turns[:-1]))))
     assert np.degrees(change.max()) < 3.0
+
+
+def test_the_page_about_trackers_runs(capsys):
+    """The examples of docs/live_trackers.md run as they stand, and say what they promise."""
+    text = (Path(__file__).resolve().parents[1] / "docs" / "live_trackers.md").read_text("utf-8")
+    exec("".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)), {})
+    printed = capsys.readouterr().out
+    assert "'head': 1" in printed and "pelvis and head are" in printed
+    profile = re.search(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert profile and parse_profile(profile[1]).trackers["LHR-1"].point == "head"

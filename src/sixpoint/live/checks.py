@@ -77,14 +77,14 @@ class Checks:
 
         Args:
             time: When it was taken [s].
-            positions: (n, 3) [m]; NaN where a tracker did not report.
+            positions: (n, 3) [m]; NaN where a tracker did not report, or reported no place in the room.
             rotations: (n, 4); NaN where it has none.
         """
         raw = np.concatenate([positions, rotations], axis=1)
         frozen = self._find_frozen(time, raw)
         p, q = positions[self._order], rotations[self._order]
         size = np.abs(p).max(axis=1)  # NaN stays NaN
-        known = size < ROOM
+        known = np.isfinite(size)
         seen = np.isfinite(self.time)
         ago = np.maximum(time - self.time, 0.0)
         origin = known & (size < ORIGIN) & ~(np.abs(self.place).max(axis=1) < JUMP)

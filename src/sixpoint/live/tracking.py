@@ -21,7 +21,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import EFFECTORS, GUIDES, POINTS
 from sixpoint.errors import TargetError
-from sixpoint.live.checks import Checks
+from sixpoint.live.checks import ROOM, Checks
 from sixpoint.live.stance import Posture, Stance, about_up, turned
 from sixpoint.live.stepping import ease
 from sixpoint.signals.one_euro import OneEuro, find_smoothing
@@ -34,6 +34,7 @@ COAST = 0.15  # time constant with which its velocity dies away; of 0.05 to 0.3 
 AWAY = 1.0  # then it goes to its place without a tracker in this time [s]
 RETURN = 0.15  # a point that returns is eased in [s]
 SIX = len(EFFECTORS)
+LARGEST, LATEST = 1e6, 1e12  # numbers of a rotation and times that are none are beyond these
 IDENTITY = rot.IDENTITY
 LIMBS, OTHERS = np.arange(2, SIX), np.arange(2, len(POINTS))
 SEEN, GUESSED, ALONE = 0, 1, 2  # how a point is placed: as seen, from the body, or by itself
@@ -146,9 +147,9 @@ class Tracking:
         Raises:
             TargetError: Another shape.
         """
-        p, q = _rows(positions, 3), _rows(rotations, 4)
+        p, q = _rows(positions, 3, ROOM), _rows(rotations, 4, LARGEST)
         before = time if self._time is None else self._time
-        time = max(time, before) if np.isfinite(time) else before if np.isfinite(before) else 0.0
+        time = max(time, before) if abs(time) < LATEST else before if abs(before) < LATEST else 0.0
         dt, self._time = (0.0 if self._time is None else time - before), time
         judged = self.checks.judge(time, p, q)
         valid = judged.believed
@@ -295,8 +296,8 @@ class Tracking:
         )
 
 
-def _rows(values: ArrayLike | None, width: int) -> Array:
-    """Readings as (11, width), NaN where nothing is given."""
+def _rows(values: ArrayLike | None, width: int, most: float) -> Array:
+    """Readings as (11, width), NaN where nothing is given or a number is not below ``most``."""
     out = np.full((len(POINTS), width), np.nan)
     if values is None:
         return out
@@ -309,7 +310,7 @@ def _rows(values: ArrayLike | None, width: int) -> Array:
             f"readings must be ({SIX}, {width}) or ({len(POINTS)}, {width}), one row per point of "
             f"{', '.join(POINTS)}; got {given.shape}"
         )
-    out[: len(given)] = given
+    out[: len(given)] = np.where(np.abs(given) < most, given, np.nan)
     return out
 
 
