@@ -104,7 +104,7 @@ def test_addresses_and_settings(tmp_path):
             parse_address(wrong, 1)
     path = tmp_path / "me.toml"
     path.write_text("stature = 'tall'")
-    with pytest.raises(sp.FormatError, match="me.toml"):
+    with pytest.raises(sp.FormatError, match=r"me\.toml"):
         Live(profile=path).make_session()
     with pytest.raises(sp.SixpointError, match="rotations"):
         Live(method="sik", rotations=("head",)).make_session()
