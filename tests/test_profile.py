@@ -106,6 +106,12 @@ def test_a_calibration_is_kept():
         if np.isfinite(joints.positions[300, k]).all():
             np.testing.assert_allclose(p, joints.positions[300, k], atol=1e-12)
             assert abs(q @ joints.rotations[300, k]) > 1 - 1e-12
+    p, q = np.full((11, 3), np.nan), np.full((11, 4), np.nan)
+    p[:5], q[:4] = targets.positions[300, :5], targets.rotations[300, :4]
+    points, turns = again.apply_all(p, q)
+    np.testing.assert_allclose(points[:4], joints.positions[300, :4], atol=1e-12)
+    np.testing.assert_array_equal(points[4], p[4])  # without a rotation the tracker is the joint
+    assert np.isnan(points[5:]).all() and np.isnan(turns[4:]).all()
     with pytest.raises(TargetError, match="no points named nose"):
         Profile.from_calibration(found, {"nose": "x"})
     with pytest.raises(TargetError, match="each tracker is on one point"):

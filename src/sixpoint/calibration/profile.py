@@ -9,6 +9,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -95,14 +96,36 @@ class Profile:
 
         A part of the mount that is not known is taken as none; without a rotation the tracker is the joint.
         """
-        mount = self.trackers[serial].mount
-        p, q = np.asarray(position, float), np.asarray(rotation, float)
-        if not np.isfinite(q).all():
-            return p, q
-        offset = np.where(np.isfinite(mount.offset).all(), mount.offset, 0.0)
-        turn = mount.rotation if np.isfinite(mount.rotation).all() else rot.IDENTITY
-        q = rot.normalised(q)
-        return p - rot.mul_vec(q, offset), rot.mul(q, rot.inv(turn))
+        row = POINTS.index(self.trackers[serial].point)
+        points, turns = np.full((len(POINTS), 3), np.nan), np.full((len(POINTS), 4), np.nan)
+        points[row], turns[row] = position, rotation
+        points, turns = self.apply_all(points, turns)
+        return points[row], turns[row]
+
+    def apply_all(self, positions: Array, rotations: Array) -> tuple[Array, Array]:
+        """All readings of a frame at once, as ``apply``.
+
+        Args:
+            positions: (11, 3) in the order of ``POINTS`` [m]; NaN where there is none.
+            rotations: (11, 4) likewise, NaN where a tracker has none.
+        """
+        offsets, back = self._mounts
+        known = np.isfinite(rotations).all(axis=1, keepdims=True)
+        q = rot.normalised(np.where(known, rotations, rot.IDENTITY))
+        joints = positions - np.where(known, rot.mul_vec(q, offsets), 0.0)
+        return joints, np.where(known, rot.mul(q, back), np.nan)
+
+    @cached_property
+    def _mounts(self) -> tuple[Array, Array]:
+        """Offsets (11, 3) and inverse rotations (11, 4) of the mounts; none where they are not known."""
+        offsets, back = np.zeros((len(POINTS), 3)), np.tile(rot.IDENTITY, (len(POINTS), 1))
+        for worn in self.trackers.values():
+            row = POINTS.index(worn.point)
+            if np.isfinite(worn.mount.offset).all():
+                offsets[row] = worn.mount.offset
+            if np.isfinite(worn.mount.rotation).all():
+                back[row] = rot.inv(worn.mount.rotation)
+        return offsets, back
 
 
 def format_profile(profile: Profile) -> str:
