@@ -16,11 +16,19 @@ IDENTITY: Array = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.flags.writeable = False
 
 
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """``np.cross`` of (..., 3), a third of its time on small arrays."""
+    return np.asarray(a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1))
+
+
 def mul(a: ArrayLike, b: ArrayLike) -> Array:
     """Compose rotations: ``mul(q_a_b, q_b_c) = q_a_c``, shape (..., 4)."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     av, aw, bv, bw = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    vector = aw * bv + bw * av + np.cross(av, bv)
+    vector = aw * bv + bw * av + _cross(av, bv)
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
     return np.concatenate([vector, scalar], axis=-1)
 
@@ -33,8 +41,9 @@ def inv(q: ArrayLike) -> Array:
 def mul_vec(q: ArrayLike, v: ArrayLike) -> Array:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
     q, v = np.asarray(q, float), np.asarray(v, float)
-    t = 2.0 * np.cross(q[..., :3], v)
-    return v + q[..., 3:] * t + np.cross(q[..., :3], t)
+    axis = q[..., :3]
+    t = 2.0 * _cross(axis, v)
+    return np.asarray(v + q[..., 3:] * t + _cross(axis, t))
 
 
 def normalised(q: ArrayLike) -> Array:
