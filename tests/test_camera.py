@@ -15,7 +15,7 @@ from sixpoint.live import vmc
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 
-import camera  # noqa: E402
+import camera
 
 FIGURE = sp.Figure.from_stature(1.75)
 

@@ -1,7 +1,7 @@
 """The live loop: datagrams in, poses solved as soon as a set is complete, datagrams out.
 
-One thread, one selector. All that waits on a socket is read first, so the newest packet wins and no backlog
-builds up; then every session whose set is complete is solved and sent. A timer only fills gaps. Sending never
+One thread, one selector. All that waits on a socket is read at once; a set that is complete is solved and sent,
+but where many wait the newest wins, so that no backlog builds up. A timer only fills gaps. Sending never
 waits: what a full or closed receiver does not take is counted and gone. No packet ends the loop.
 """
 
@@ -30,6 +30,7 @@ PROTOCOLS: dict[str, Callable[[bytes], Packet]] = {
 """Protocol -> what reads one of its datagrams."""
 
 DRAIN = 256  # datagrams read from a socket before poses are solved
+BEHIND = 3  # sets that wait and are posed one by one; of more the newest counts
 BIGGEST = 65_536  # bytes
 ONE_SENDER = 1.0  # s, a second sender is refused while the first one was heard within this
 GAP = 1.5  # frame times without a complete set after which the timer poses
@@ -154,7 +155,7 @@ class LiveLoop:
     def _read(self, channel: Channel) -> None:
         """All that waits on a socket; the pose as soon as a set is complete."""
         assert channel.socket is not None
-        complete, arrived = False, 0.0
+        pending, posed, arrived = False, 0, 0.0
         for _ in range(DRAIN):
             try:
                 data, source = channel.socket.recvfrom(BIGGEST)
@@ -164,8 +165,11 @@ class LiveLoop:
                 channel.statistics.count("socket errors")
                 continue
             arrived = time.perf_counter()
-            complete |= self._take(channel, data, source[:2], arrived)
-        if complete:
+            pending |= self._take(channel, data, source[:2], arrived)
+            if pending and posed < BEHIND:
+                self._pose(channel, time.perf_counter(), arrived)
+                pending, posed = False, posed + 1
+        if pending:
             self._pose(channel, time.perf_counter(), arrived)
 
     def _take(self, channel: Channel, data: bytes, source: tuple[str, int], now: float) -> bool:
