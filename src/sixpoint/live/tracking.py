@@ -35,6 +35,7 @@ AWAY = 1.0  # then it goes to its place without a tracker in this time [s]
 RETURN = 0.15  # a point that returns is eased in [s]
 SIX = len(EFFECTORS)
 LARGEST, LATEST = 1e6, 1e12  # numbers of a rotation and times that are none are beyond these
+INSTANT = 1e-6  # times that are nearer to each other are one [s]
 IDENTITY = rot.IDENTITY
 LIMBS, OTHERS = np.arange(2, SIX), np.arange(2, len(POINTS))
 SEEN, GUESSED, ALONE = 0, 1, 2  # how a point is placed: as seen, from the body, or by itself
@@ -150,6 +151,8 @@ class Tracking:
         p, q = _rows(positions, 3, ROOM), _rows(rotations, 4, LARGEST)
         before = time if self._time is None else self._time
         time = max(time, before) if abs(time) < LATEST else before if abs(before) < LATEST else 0.0
+        if self._time is not None and time - before < INSTANT:
+            time = before
         dt, self._time = (0.0 if self._time is None else time - before), time
         judged = self.checks.judge(time, p, q)
         valid = judged.believed
