@@ -21,7 +21,8 @@ ALLOWED = {
     "solvers": {"solvers", "kernels", "body", "errors"},
     "study": {"study", "signals", "body", "errors"},
     "studies": set(),
-    "jobs": {"jobs", "solvers", "formats", "samples", "datasets", "study", "body", "errors"},
+    "viewer": {"viewer", "body", "errors"},
+    "jobs": {"jobs", "solvers", "formats", "samples", "datasets", "study", "viewer", "body", "errors"},
     "cli": {"cli", "jobs", "study", "solvers", "body", "errors"},
     "__main__": {"cli"},
 }
@@ -36,7 +37,8 @@ LIBRARIES = {
     "calibration": {"numpy", "scipy"},
     "solvers": {"numpy"},
     "study": {"numpy", "scipy", "matplotlib", "torch"},
-    "jobs": {"numpy"},
+    "viewer": {"numpy", "viser"},
+    "jobs": {"numpy", "viser"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
 """Room -> third-party libraries it may import."""
@@ -71,7 +73,7 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch"}:
+        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch", "viser"}:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

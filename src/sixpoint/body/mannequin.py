@@ -57,7 +57,7 @@ class Mannequin:
         return _Builder(figure, 0.55 if slim else 1.0).build(slim)
 
     def place(self, positions: Array, world: Array) -> Array:
-        """Centres of the balls (..., B, 3) [m], of joints at positions (..., J, 3) with rotations (..., J, 4)."""
+        """Centres of the balls (..., B, 3) [m] of joints in the world: (..., J, 3) [m] and (..., J, 4)."""
         carried = rot.mul_vec(world[..., self.joints, :], self.offsets)
         return np.asarray(positions[..., self.joints, :] + carried)
 

@@ -22,6 +22,7 @@ from sixpoint.cli.info import info
 from sixpoint.cli.reconstruct import reconstruct
 from sixpoint.cli.screen import Screen, messages
 from sixpoint.cli.study import study
+from sixpoint.cli.view import view
 from sixpoint.errors import SixpointError
 
 HELP = """Pose a whole human figure from six tracked points: pelvis, head, wrists and ankles.
@@ -35,7 +36,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, compare, convert, info, study, data):
+    for command in (demo, view, reconstruct, compare, convert, info, study, data):
         app.command(command)
     return app
 

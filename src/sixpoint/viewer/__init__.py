@@ -1,8 +1,8 @@
 """A page in the browser that shows what it is given and reports what is dragged; knows no solver and no file.
 
-``open_server`` listens, ``Scene`` holds bodies, handles and obstacles, ``Panel`` the controls. All of them may be
-driven from any thread. Reports come as calls ``report(name, value)`` on the server's thread and must return at once.
-Every browser that has the page open sees, and may change, the same things.
+``open_server`` listens, ``Scene`` holds bodies, handles and obstacles, ``Panel`` the controls. All of them
+may be driven from any thread. Reports come as calls ``report(name, value)`` on the server's thread and must
+return at once. Every browser that has the page open sees, and may change, the same things.
 """
 
 from sixpoint.viewer.panel import Choice, Panel, Setting

@@ -1,4 +1,4 @@
-"""A body on the page: a mannequin made of a few batches of balls and tubes, so that a frame is a few small messages."""
+"""A body on the page: a mannequin in a few batches of balls and tubes, so that a frame is little to send."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.mannequin import Mannequin
-from sixpoint.viewer.colours import GHOST, LIMIT, SIDES
+from sixpoint.viewer.colours import GHOST, LIMIT, SIDES, as_linear
 from sixpoint.viewer.meshes import find_tubes, make_sphere, make_tube
 
 Array = NDArray[np.float64]
 
+OPACITY = 0.36  # of the truth
 SWOLLEN = 1.22  # ball of a joint at its limit
 
 
@@ -38,13 +39,13 @@ class BodyView:
         self._root = scene.add_frame(name, show_axes=False, visible=False)
         self._tubes = find_tubes(self._body)
         self._ghost = ghost
-        colours = np.array([GHOST if ghost else SIDES[part.side] for part in self._body.parts], np.uint8)
+        colours = as_linear([GHOST if ghost else SIDES[part.side] for part in self._body.parts])
         self._ball_colours = np.empty((len(self._body.radii), 3), np.uint8)
         for part, colour in zip(self._body.parts, colours, strict=True):
             self._ball_colours[part.balls] = colour
         self._painted: frozenset[int] = frozenset()
         centres = self._body.place(*figure.neutral_pose.compute_transforms())
-        opacity = 0.42 if ghost else None
+        opacity = OPACITY if ghost else None
         self._balls = scene.add_batched_meshes_simple(
             f"{name}/balls",
             *make_sphere(),
@@ -97,8 +98,10 @@ class BodyView:
             return
         self._painted = asked
         at_limit = np.isin(self._body.joints, list(asked)) & ~self._body.offsets.any(axis=1)
-        self._balls.batched_colors = np.where(at_limit[:, None], np.array(LIMIT, np.uint8), self._ball_colours)
-        self._balls.batched_scales = np.where(at_limit, SWOLLEN, 1.0).astype(np.float32) * self._body.radii.astype(np.float32)
+        self._balls.batched_colors = np.where(at_limit[:, None], as_linear(LIMIT), self._ball_colours)
+        self._balls.batched_scales = np.where(at_limit, SWOLLEN, 1.0).astype(
+            np.float32
+        ) * self._body.radii.astype(np.float32)
 
     @property
     def visible(self) -> bool:
@@ -111,8 +114,11 @@ class BodyView:
             self._root.visible = visible
 
     def move(self, shift: Array) -> None:
-        """Stand it elsewhere: (3,) [m]."""
-        self._root.position = np.asarray(shift, float)
+        """Stand it elsewhere: (3,) [m]; a ghost that stands by itself is not translucent."""
+        if not np.array_equal(self._root.position, shift):
+            self._root.position = np.asarray(shift, float)
+            for handle in (self._balls, *self._limbs):
+                handle.opacity = OPACITY if self._ghost and not np.any(shift) else None
 
     def remove(self) -> None:
         """Take it off the page."""

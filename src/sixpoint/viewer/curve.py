@@ -34,14 +34,18 @@ class Curve:
         self._stride, self._shown = 1, -1
 
     def show(self, times: ArrayLike, values: ArrayLike) -> None:
-        """A curve (F,) over times [s]; of long ones every nth point. Of fewer than two points nothing is shown."""
+        """A curve (F,) over times [s]; of long ones every nth point; nothing of fewer than two points."""
         t, y = np.asarray(times, float), np.asarray(values, float)
         self._plot.visible = len(t) > 1
         if len(t) < 2:
             return
         self._stride = -(-len(t) // MOST)
         self._shown = -1
-        self._plot.data = (t[:: self._stride].copy(), y[:: self._stride].copy(), np.zeros(len(t[:: self._stride])))
+        self._plot.data = (
+            t[:: self._stride].copy(),
+            y[:: self._stride].copy(),
+            np.zeros(len(t[:: self._stride])),
+        )
 
     def mark(self, frame: int) -> None:
         """Mark a frame by a needle."""

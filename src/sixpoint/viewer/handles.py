@@ -1,5 +1,7 @@
-"""What is dragged: six balls and two obstacles. A ball moves with the mouse in the plane of the screen; the last one
-touched has arrows and planes, and rings where its rotation counts.
+"""What is dragged: six balls and two obstacles.
+
+A ball moves with the mouse in the plane of the screen; the last one touched has arrows and planes, and rings
+where its rotation counts.
 """
 
 from __future__ import annotations
@@ -48,7 +50,12 @@ class Handle:
         touched: Callable[[int], None] = lambda number: None,
     ) -> None:
         self._gizmo = scene.add_transform_controls(
-            f"{name}_arrows", scale=scale, line_width=2.2, depth_test=False, disable_rotations=not turns, visible=False
+            f"{name}_arrows",
+            scale=scale,
+            line_width=2.2,
+            depth_test=False,
+            disable_rotations=not turns,
+            visible=False,
         )
         self._thing = thing(name)
         self._number, self._dragged, self._touched = number, dragged, touched
@@ -136,7 +143,9 @@ class Handles:
 
     def __init__(self, scene: viser.SceneApi, dragged: Dragged, unit: float) -> None:
         def ball(name: str) -> viser.IcosphereHandle:
-            return scene.add_icosphere(name, radius=RADIUS * unit, color=INK, cast_shadow=False, receive_shadow=False)
+            return scene.add_icosphere(
+                name, radius=RADIUS * unit, color=INK, cast_shadow=False, receive_shadow=False
+            )
 
         self._all = [
             Handle(scene, f"/handles/{name}", ball, k, dragged, scale=0.2 * unit, touched=self.select)

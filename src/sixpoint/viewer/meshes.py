@@ -1,4 +1,4 @@
-"""Shapes that are sent once; each frame then places copies of them: balls, and tapered tubes between balls."""
+"""Shapes that are sent once; each frame places copies of them: balls, and tapered tubes between balls."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def make_sphere() -> Mesh:
     """Unit ball as vertices (V, 3) and triangles (T, 3)."""
     down = np.linspace(0, np.pi, RINGS + 1)
     ring = _circle()
-    rows = [np.column_stack([np.sin(a) * ring[:, 0], np.full(SECTORS, np.cos(a)), np.sin(a) * ring[:, 1]]) for a in down]
+    rows = [
+        np.column_stack([np.sin(a) * ring[:, 0], np.full(SECTORS, np.cos(a)), np.sin(a) * ring[:, 1]])
+        for a in down
+    ]
     return np.concatenate(rows), _join_rings(RINGS + 1)
 
 
@@ -33,7 +36,7 @@ def make_tube(taper: float) -> Mesh:
     ring = _circle()
     foot = np.column_stack([ring[:, 0], np.zeros(SECTORS), ring[:, 1]])
     top = np.column_stack([taper * ring[:, 0], np.ones(SECTORS), taper * ring[:, 1]])
-    return np.concatenate([foot, top])[::-1].copy(), _join_rings(2)
+    return np.concatenate([top, foot]), _join_rings(2)
 
 
 def _circle() -> Array:
@@ -48,7 +51,10 @@ def _join_rings(rings: int) -> NDArray[np.int64]:
     faces = []
     for low in range(0, (rings - 1) * SECTORS, SECTORS):
         high = low + SECTORS
-        faces += [np.column_stack([low + k, low + after, high + k]), np.column_stack([low + after, high + after, high + k])]
+        faces += [
+            np.column_stack([low + k, low + after, high + k]),
+            np.column_stack([low + after, high + after, high + k]),
+        ]
     return np.concatenate(faces)
 
 
@@ -69,7 +75,7 @@ class Tubes:
     taper: float
 
     def place(self, centres: Array, radii: Array) -> tuple[Array, Array, Array]:
-        """Positions (T, 3), rotations (T, 4) and scales (T, 3) of the copies, of balls at ``centres`` (B, 3)."""
+        """Positions (T, 3), rotations (T, 4) and scales (T, 3) of the copies, between balls at (B, 3)."""
         along = centres[self.last] - centres[self.first]
         length = np.linalg.norm(along, axis=-1)
         flat = length < THIN
@@ -87,4 +93,5 @@ def find_tubes(body: Mannequin) -> list[Tubes]:
             thick, thin = sorted(pair, key=lambda ball: -body.radii[ball])
             taper = TAPER if body.radii[thin] < 0.9 * body.radii[thick] else 1.0
             found.setdefault(taper, []).append((thick, thin, number))
-    return [Tubes(*np.array(rows).T, taper=taper) for taper, rows in sorted(found.items())]
+    tubes = {taper: np.array(rows).T for taper, rows in sorted(found.items())}
+    return [Tubes(thick, thin, number, taper) for taper, (thick, thin, number) in tubes.items()]

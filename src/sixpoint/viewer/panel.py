@@ -1,14 +1,15 @@
-"""The controls beside the scene. Which methods, options and tasks there are it is told; what is chosen it reports."""
+"""The controls beside the scene: told what methods and options there are, it reports what is chosen."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import viser
 
-from sixpoint.viewer.colours import LEFT
+from sixpoint.viewer.colours import BRAND
 from sixpoint.viewer.curve import Curve
 from sixpoint.viewer.scene import OBSTACLES, Report
 
@@ -34,6 +35,7 @@ class Setting:
         value: bool, number, or one of a choice.
         domain: Least and largest number, or a choice; None for a bool.
         hint: Shown when the mouse rests on it.
+        folder: Name of a closed folder in which it is found; empty for none.
     """
 
     name: str
@@ -41,20 +43,21 @@ class Setting:
     value: bool | float | str
     domain: tuple[float, float] | Choice | None = None
     hint: str | None = None
+    folder: str = ""
 
 
 class Panel:
     """The controls.
 
-    Reports ``"clip"`` (name), ``"play"``, ``"frame"`` (number), ``"speed"`` (factor), ``"truth"`` (one of ``TRUTHS``),
-    ``"method"`` (name), ``"setting"`` (name, value), ``"task"`` (row, one of the four signs), ``"show obstacle"``
-    (number, bool), ``"reset"``, ``"save pose"`` and ``"save motion"`` (name of a file).
+    Reports ``"clip"`` (name), ``"play"``, ``"frame"`` (number), ``"speed"`` (factor), ``"truth"`` (one of
+    ``TRUTHS``), ``"method"`` (name), ``"setting"`` (name, value), ``"task"`` (row, one of the four signs),
+    ``"show obstacle"`` (number, bool), ``"reset"``, ``"save pose"`` and ``"save motion"`` (name of a file).
 
     Args:
         server: Where.
         report: Told what is chosen, on the server's thread.
         clips: Names of recordings; of several one is chosen.
-        methods: Name -> what the method is, in a few words.
+        methods: Their names.
         method: The one at the beginning.
         saves: Whether poses and motions may be saved.
     """
@@ -68,10 +71,11 @@ class Panel:
         method: str,
         saves: bool,
     ) -> None:
-        self._gui, self._report = server.gui, report
-        gui = server.gui
+        self._report = report
+        gui: Any = server.gui  # its values are typed in a way that mypy takes for read-only
+        self._gui = gui
         gui.configure_theme(
-            show_logo=False, show_share_button=False, brand_color=LEFT, control_width="medium"
+            show_logo=False, show_share_button=False, brand_color=BRAND, control_width="medium"
         )
         gui.set_panel_label("sixpoint")
         self._status = gui.add_html("")
@@ -79,15 +83,17 @@ class Panel:
             self._clip = gui.add_dropdown("recording", tuple(clips) or ("-",), visible=len(clips) > 1)
             self._frame = gui.add_slider("frame", 0, 1, 1, 0)
             self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
-            self._speed = gui.add_dropdown("speed", SPEEDS, "1x")
-            self._truth = gui.add_dropdown("truth", TRUTHS, "over", hint="The recording, in grey")
+            self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x")
+            self._truth = gui.add_dropdown(
+                "truth", TRUTHS, initial_value="over", hint="The recording, in grey"
+            )
         self._motion.visible = False
-        self._method = gui.add_dropdown("method", tuple(methods), method)
+        self.curve = Curve(gui)
+        self._method = gui.add_dropdown("method", tuple(methods), initial_value=method)
         self._settings_folder = gui.add_folder("Options", expand_by_default=True)
         self._settings: list[Any] = []
         self._tasks_folder = gui.add_folder("Priorities", visible=False)
-        self._tasks: list[viser.GuiButtonGroupHandle[str]] = []
-        self.curve = Curve(gui)
+        self._tasks: list[Any] = []
         with gui.add_folder("Obstacles", expand_by_default=False):
             self._obstacles = [gui.add_checkbox(name, False) for name in OBSTACLES]
         self._reset = gui.add_button("Reset", icon=viser.Icon.REFRESH)
@@ -98,7 +104,9 @@ class Panel:
         self._connect()
 
     def _connect(self) -> None:
-        def tell(name: str, value: Callable[[Any], Any] = lambda target: target.value) -> Callable[[Any], Any]:
+        def tell(
+            name: str, value: Callable[[Any], Any] = lambda target: target.value
+        ) -> Callable[[Any], Any]:
             async def callback(event: Any) -> None:
                 if event.client_id is not None:  # else it was set from here
                     self._report(name, value(event.target))
@@ -111,7 +119,7 @@ class Panel:
         self._truth.on_update(tell("truth"))
         self._method.on_update(tell("method"))
         for number, box in enumerate(self._obstacles):
-            box.on_update(tell("show obstacle", lambda target, k=number: (k, target.value)))
+            box.on_update(tell("show obstacle", partial(_numbered, number)))
         self._play.on_click(tell("play"))
         self._reset.on_click(tell("reset"))
         self._save_pose.on_click(tell("save pose", lambda _: self._name.value))
@@ -147,15 +155,26 @@ class Panel:
         """Put others in place of the options."""
         for control in self._settings:
             control.remove()
+        self._settings, folders = [], {}
         with self._settings_folder:
-            self._settings = [self._add_setting(setting) for setting in settings]
+            for setting in settings:
+                if not setting.folder:
+                    self._settings.append(self._add_setting(setting))
+                    continue
+                if setting.folder not in folders:
+                    folders[setting.folder] = self._gui.add_folder(setting.folder, expand_by_default=False)
+                with folders[setting.folder]:
+                    self._add_setting(setting)
+        self._settings += folders.values()
         self._settings_folder.visible = bool(settings)
 
     def _add_setting(self, setting: Setting) -> Any:
         gui, domain = self._gui, setting.domain
         control: Any
         if isinstance(domain, Choice):
-            control = gui.add_dropdown(setting.label, domain.options, str(setting.value), hint=setting.hint)
+            control = gui.add_dropdown(
+                setting.label, domain.options, initial_value=str(setting.value), hint=setting.hint
+            )
         elif domain is None:
             control = gui.add_checkbox(setting.label, bool(setting.value), hint=setting.hint)
         else:
@@ -174,7 +193,7 @@ class Panel:
             while len(self._tasks) < len(rows):
                 row = len(self._tasks)
                 group = self._gui.add_button_group("", (UP, DOWN, ON))
-                group.on_click(self._tell("task", lambda target, row=row: (row, target.value)))
+                group.on_click(self._tell("task", partial(_numbered, row)))
                 self._tasks.append(group)
         for group, (label, on) in zip(self._tasks, rows, strict=True):
             group.label = label
@@ -189,3 +208,7 @@ class Panel:
         """The lines on top, as HTML: the caller escapes what is not its own."""
         if self._status.content != html:
             self._status.content = html
+
+
+def _numbered(number: int, control: Any) -> tuple[int, Any]:
+    return number, control.value

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sixpoint.body.figure import Figure
 from sixpoint.body.mannequin import HEIGHT
 from sixpoint.viewer.body_view import BodyView
-from sixpoint.viewer.colours import GRID, SECTION, WOOD
+from sixpoint.viewer.colours import FLOOR, GRID, SECTION, WOOD
 from sixpoint.viewer.handles import Handle, Handles
 
 Array = NDArray[np.float64]
@@ -23,14 +23,14 @@ SPHERE, BOX = 0.15, (0.5, 0.06, 0.35)
 """Radius of the sphere and sides of the box that may stand in the way [m]."""
 OBSTACLES = ("sphere", "box")
 BESIDE = (-1.0, 0.0, 0.0)  # where the truth stands when it is beside the result [m]
-CAMERA, LOOK = (2.15, 1.6, 2.9), (0.0, 0.9, 0.0)
+CAMERA, LOOK = (2.2, 1.45, 3.5), (0.0, 0.95, 0.0)
 
 
 class Scene:
     """What is seen in three dimensions.
 
-    Reports ``"drag"`` with (number of the effector, position (3,) [m], rotation (4,) xyzw), and ``"obstacle"`` with
-    the same of an obstacle.
+    Reports ``"drag"`` with (number of the effector, position (3,) [m], rotation (4,) xyzw), and
+    ``"obstacle"`` with the same of an obstacle.
 
     Args:
         server: Where.
@@ -42,8 +42,10 @@ class Scene:
         scene = server.scene
         scene.set_up_direction("+y")
         scene.world_axes.visible = False
-        scene.configure_default_lights(enabled=True, cast_shadow=True)
-        scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(214, 220, 228), intensity=0.6)
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map("studio", environment_intensity=0.35)
+        scene.add_light_directional("/sun", intensity=1.9, position=(2.0, 4.0, 2.5), cast_shadow=True)
+        scene.add_light_directional("/fill", intensity=0.55, position=(-3.0, 2.0, 1.0))
         scene.add_grid(
             "/floor",
             plane="xz",
@@ -54,7 +56,7 @@ class Scene:
             cell_color=GRID,
             section_color=SECTION,
             shadow_opacity=0.22,
-            plane_color=(250, 251, 252),
+            plane_color=FLOOR,
             plane_opacity=1.0,
             fade_distance=14.0,
             fade_from="origin",
@@ -99,9 +101,7 @@ class Scene:
         self.figure = figure
         self._truth = BodyView(scene, "/truth", figure, ghost=True)
         self._body = BodyView(scene, "/body", figure)
-        self._handles = Handles(
-            scene, lambda *where: self._report("drag", where), figure.height / HEIGHT
-        )
+        self._handles = Handles(scene, lambda *where: self._report("drag", where), figure.height / HEIGHT)
         self._handles.visible = False
 
     def show(self, positions: Array, world: Array) -> None:

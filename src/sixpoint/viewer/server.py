@@ -64,7 +64,7 @@ def find_port(host: str, first: int) -> int:
         found = socket.getaddrinfo(host, first, type=socket.SOCK_STREAM)
     except OSError as error:
         raise SixpointError(f"cannot listen on {host!r}: {error.strerror or error}") from None
-    family, kind, protocol, _, (*address, _) = (*found[0][:4], found[0][4][:2])
+    family, kind, protocol, _, address = found[0]
     for port in range(first, min(first + NEXT, 65536)):
         with socket.socket(family, kind, protocol) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

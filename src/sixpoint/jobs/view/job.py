@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ import viser
 
 from sixpoint.errors import FormatError
 from sixpoint.jobs.view.clips import Clip
+from sixpoint.jobs.view.inbox import Inbox
 from sixpoint.jobs.view.posing import Posing
 from sixpoint.jobs.view.session import Session
 from sixpoint.solvers.registry import SOLVERS
@@ -62,23 +63,17 @@ def open_page(
         raise FormatError(folder, "this is no folder to save into; create it first")
     posing.make(clips[0].figure)  # before the port is taken
     server = open_server(host, port)
-    inbox: list[Callable[[str, object], None]] = []
-
-    def report(name: str, value: object) -> None:
-        for take in inbox:
-            take(name, value)
-
+    inbox = Inbox()
     try:
         methods = [*SOLVERS] if posing.method in SOLVERS else [*SOLVERS, posing.method]
-        panel = Panel(server, report, [c.name for c in clips], methods, posing.method, folder is not None)
-        session = Session(clips, posing, Scene(server, report), panel, folder)
-        inbox.append(session.report)
+        panel = Panel(server, inbox.put, [c.name for c in clips], methods, posing.method, folder is not None)
+        session = Session(clips, posing, Scene(server, inbox.put), panel, inbox, folder)
         worker = threading.Thread(target=session.run, name="sixpoint page", daemon=True)
         worker.start()
         try:
             yield Page(server, session, *describe_address(server))
         finally:
-            session.stop()
+            inbox.close()
             worker.join(5.0)
     finally:
         close(server)

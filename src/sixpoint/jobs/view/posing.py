@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import EFFECTORS
@@ -22,13 +23,14 @@ from sixpoint.solvers.registry import DEFAULT as METHOD
 from sixpoint.solvers.registry import make_solver
 from sixpoint.study.limit_excess import compute_limit_excess
 from sixpoint.study.metrics import Errors, compute_errors
+from sixpoint.study.movement import compute_local_rotations
 from sixpoint.viewer.scene import BOX, OBSTACLES, SPHERE
 
 Array = NDArray[np.float64]
 
 SHAPES: tuple[Sphere | Box, ...] = (Sphere(SPHERE), Box(BOX))
 LEAD = 60  # frames solved before one from which dragging begins, for what methods remember
-AT_LIMIT = np.radians(0.5)
+AT_LIMIT, NEUTRAL = np.radians(0.5), np.radians(2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +140,9 @@ def solve_up_to(solver: Solver, clip: Clip, frame: int, rotations: Array) -> Sol
 
 
 def find_limited(figure: Figure, pose: Pose) -> list[int]:
-    """Joints at or beyond their limits."""
-    excess = compute_limit_excess(figure, Motion.from_poses([pose], 1.0), AT_LIMIT)[0]
-    return [int(joint) for joint in np.flatnonzero(excess > 0)]
+    """Joints at or beyond their limits; not neutral ones, as a straight knee always is at its limit."""
+    motion = Motion.from_poses([pose], 1.0)
+    excess = compute_limit_excess(figure, motion, AT_LIMIT)[0]
+    joints = np.flatnonzero(excess > 0)
+    local = compute_local_rotations(figure, motion, joints.tolist())[0]
+    return [int(joint) for joint, turn in zip(joints, rot.angle(local), strict=True) if turn > NEUTRAL]

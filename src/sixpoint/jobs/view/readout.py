@@ -24,7 +24,10 @@ def describe_frame(solved: SolvedClip, frame: int) -> list[tuple[str, str]]:
     if solved.errors is not None:
         distance, angle = solved.errors.distances.mean(axis=1), solved.errors.orientation_curve
         rows += [
-            ("position", f"<b>{100 * distance[frame]:.1f} cm</b> &nbsp;({100 * distance.mean():.1f} overall)"),
+            (
+                "position",
+                f"<b>{100 * distance[frame]:.1f} cm</b> &nbsp;({100 * distance.mean():.1f} overall)",
+            ),
             ("orientation", f"<b>{angle[frame]:.2f} rad</b> &nbsp;({angle.mean():.2f} overall)"),
         ]
     return [*rows, ("solve", f"<b>{1e6 * solved.seconds:.1f} us</b> a frame")]

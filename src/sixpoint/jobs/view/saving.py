@@ -1,4 +1,4 @@
-"""Saving from the page: into one folder that was named at the start, under a plain name, never over anything."""
+"""Saving from the page: into one folder named at the start, under a plain name, never over anything."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ def save_numbered(motion: Motion, folder: Path, name: str) -> Path:
     """
     stem = name.strip().removesuffix(".bvh")
     if not PLAIN.fullmatch(stem):
-        raise SixpointError("a name is letters, digits, spaces, - and _, at most 60; it goes into the folder of --out")
+        raise SixpointError(
+            "a name is letters, digits, spaces, - and _, at most 60; it goes into the folder of --out"
+        )
     for number in range(1, MOST + 1):
         path = folder / (f"{stem}.bvh" if number == 1 else f"{stem}_{number}.bvh")
         if not (path.exists() or path.is_symlink()):

@@ -1,17 +1,17 @@
 """What happens on the page: reports go into an inbox, and one thread takes them out, solves and shows.
 
-Only that thread touches the state, so that callbacks of any number of browsers do no harm. Of reports that replace
-each other the newest counts. A failure is said on the page, which goes on.
+Only that thread touches the state, so that callbacks of any number of browsers do no harm. A failure is said
+on the page, which goes on.
 """
 
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from sixpoint.errors import SixpointError
 from sixpoint.jobs.reconstruct import finish
 from sixpoint.jobs.view import readout
 from sixpoint.jobs.view.clips import Clip, known_rotations
+from sixpoint.jobs.view.inbox import Inbox
 from sixpoint.jobs.view.posing import (
     Posing,
     SolvedClip,
@@ -45,10 +46,9 @@ FOLLOW = 0.025  # time constant with which a point follows its handle: browsers 
 SETTLE = 0.6  # solving goes on that long after the last change, for methods with a memory [s]
 TELL = 1 / 12  # between two read-outs [s]
 IDLE = 0.5  # longest sleep [s]
-MOST = 256  # reports that wait
 NEAR = 1e-5  # [m]
-PLACES = (np.array([0.35, 1.2, 0.35, 0, 0, 0, 1.0]), np.array([0.0, 1.0, 0.45, 0, 0, 0, 1.0]))
-"""Where sphere and box begin."""
+PLACES = (np.array([0.45, 0.35, 0.45, 0, 0, 0, 1.0]), np.array([0.0, 0.05, 0.5, 0, 0, 0, 1.0]))
+"""Where sphere and box begin, from the middle of the recording's pelvis."""
 
 log = logging.getLogger("sixpoint")
 
@@ -61,11 +61,18 @@ class Session:
         posing: The method to begin with.
         scene: Where bodies are shown.
         panel: Where controls are.
+        inbox: Where both of them report to.
         folder: Where poses and motions are saved; None for nowhere.
     """
 
     def __init__(
-        self, clips: Sequence[Clip], posing: Posing, scene: Scene, panel: Panel, folder: Path | None = None
+        self,
+        clips: Sequence[Clip],
+        posing: Posing,
+        scene: Scene,
+        panel: Panel,
+        inbox: Inbox,
+        folder: Path | None = None,
     ) -> None:
         self.clips = {clip.name: clip for clip in clips}
         self.scene, self.panel, self.folder = scene, panel, folder
@@ -78,51 +85,30 @@ class Session:
         self.points = self.goals = self.clip.targets.positions[0].copy()
         self.rotations = known_rotations(self.clip, 0)
         self.seconds: deque[float] = deque(maxlen=31)
-        self._places = [place.copy() for place in PLACES]
-        self._inbox: dict[Hashable, tuple[str, Any]] = {}
-        self._waiting = threading.Condition()
-        self._stopped, self._count = False, 0
+        self._places: list[Array] = []
+        self.inbox = inbox
         self._message, self._bad = "", False
-        self._told, self._changed, self._last = -np.inf, -np.inf, 0.0
+        self._told, self._changed, self._last, self._busy = -np.inf, -np.inf, 0.0, False
         self._limited: list[int] = []
         self._begin(self.clip)
 
-    # --- reports -----------------------------------------------------------------------------------
-
-    def report(self, name: str, value: Any) -> None:
-        """Take a report, from any thread; what waits for the same thing is replaced."""
-        kind = value[0] if name in ("drag", "obstacle", "setting", "show obstacle") else None
-        with self._waiting:
-            self._count += 1
-            once = name in ("task", "play", "save pose", "save motion")
-            if len(self._inbox) < MOST:
-                self._inbox[(name, self._count if once else kind)] = (name, value)
-            self._waiting.notify()
+    # --- going on ------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Take out reports and show until ``stop``."""
-        while not self._stopped:
+        """Take out reports, solve and show, until the inbox is closed."""
+        while not self.inbox.closed:
             start = time.perf_counter()
             busy = self.step(start)
-            with self._waiting:
-                if not self._inbox and not self._stopped:
-                    pause = 1 / RATE - (time.perf_counter() - start) if busy else IDLE
-                    self._waiting.wait(max(pause, 0.0))
-
-    def stop(self) -> None:
-        """End ``run``."""
-        with self._waiting:
-            self._stopped = True
-            self._waiting.notify()
+            self.inbox.wait(max(1 / RATE - (time.perf_counter() - start), 0.0) if busy else IDLE)
 
     def step(self, now: float) -> bool:
         """Take out all reports, go on to a time [s] and show; whether something still moves."""
-        with self._waiting:
-            reports, self._inbox = list(self._inbox.values()), {}
-        dt, self._last = float(np.clip(now - self._last, 1e-4, 0.1)), now
-        for name, value in reports:
-            self._guard(lambda name=name, value=value: self._take(name, value, now))
-        return self._guard(lambda: self._go_on(now, dt)) or False
+        passed = now - self._last if self._busy else 1 / RATE  # a rest is no time
+        dt, self._last = float(np.clip(passed, 1e-4, 0.1)), now
+        for name, value in self.inbox.take():
+            self._guard(partial(self._take, name, value, now))
+        self._busy = bool(self._guard(partial(self._go_on, now, dt)))
+        return self._busy
 
     def _guard(self, act: Callable[[], Any]) -> Any:
         try:
@@ -191,12 +177,14 @@ class Session:
         """Look at another recording, from its first frame."""
         solver = self.posing.make(clip.figure)
         self.clip, self.solver, self.time, self.playing = clip, solver, 0.0, False
+        self.solved = self.solution = None
         self.scene.set_figure(clip.figure)
         self.panel.set_playing(False)
         self.panel.set_clip(clip.name, len(clip.targets), clip.truth is not None)
         known = clip.targets.positions[np.isfinite(clip.targets.positions[:, 0, 0]), 0]
         middle = known.mean(axis=0) if len(known) else np.zeros(3)
-        self.scene.look_at(np.array([middle[0], 0.52 * clip.figure.height, middle[2]]))
+        self.scene.look_at(middle)
+        self._places = self._places or [place + np.append(middle, np.zeros(4)) for place in PLACES]
         self._show_posing()
         self._solve_clip()
 
@@ -215,6 +203,9 @@ class Session:
         anew = posing.method != self.posing.method
         only_moved = posing.prioritized is False and posing.values == self.posing.values and not anew
         self.posing = posing
+        if anew:
+            self._say(f"preparing {posing.method}; the first time its kernels are compiled ...")
+            self._tell(force=True)
         if only_moved:  # an obstacle, which this method does not know
             self._say("obstacles count with --method pik and pik-flext: choose one above")
             return
@@ -227,6 +218,7 @@ class Session:
             solver.warm_up()
             self.solution = solve_frame(solver, self.points, self.rotations, None, 1 / RATE)
             self.solved = None
+            self._say("")
         self.seconds.clear()
 
     def _show_posing(self, settings: bool = True) -> None:
@@ -339,7 +331,7 @@ class Session:
 
     def _tell(self, force: bool = False) -> None:
         """Read-outs, marks and paint."""
-        if force or self.solved is None and self.solution is None:
+        if force or (self.solved is None and self.solution is None):
             self.panel.say(readout.lay_out(self.clip.name, [], self._message, self._bad))
             return
         limited = find_limited(self.clip.figure, self.pose)

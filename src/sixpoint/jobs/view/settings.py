@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from sixpoint.body.targets import EFFECTORS
@@ -35,9 +36,7 @@ def describe_settings(method: str, values: Mapping[str, Any]) -> list[Setting]:
     found: list[Setting] = []
     for name in sorted(names, key=lambda name: name != "limits"):
         found += _describe(name, parameters[name])
-    return [
-        Setting(s.name, s.label, values.get(s.name, s.value), s.domain, s.hint) for s in found
-    ]
+    return [replace(setting, value=values.get(setting.name, setting.value)) for setting in found]
 
 
 def read_settings(method: str, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,7 +64,8 @@ def _describe(name: str, parameter: inspect.Parameter) -> list[Setting]:
             for (short, what), value in zip(WEIGHTS, default, strict=True)
         ]
     if name == "rotations":
-        return [Setting(TURN + at, f"turn {at}", False, None, "Use its rotation too") for at in EFFECTORS]
+        hint = "Use its rotation too: its handle gets rings"
+        return [Setting(TURN + at, at, False, None, hint, "Rotations") for at in EFFECTORS]
     label = name.replace("_", " ")
     if isinstance(default, bool):
         return [Setting(name, label, default)]

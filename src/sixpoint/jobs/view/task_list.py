@@ -1,4 +1,4 @@
-"""Tasks of prioritized IK that can be reordered and switched on and off, and the solver of six points they make."""
+"""Tasks of prioritized IK that can be reordered and switched off, and the solver of six points they make."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
+from sixpoint.body.rig_names import SIDES
+from sixpoint.body.roles import LIMB_ROLES
 from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.solvers.base import MotionSolution, Progress, Solution
 from sixpoint.solvers.prioritized.solver import PrioritizedIK
@@ -32,7 +34,8 @@ APART = 3
 """Engine levels between two of the list's: a FLEXT limb uses two more for what it asks of the body."""
 FLESH = 0.05  # of what keeps out of an obstacle [m]
 CHUNK = 64  # frames between two reports of progress
-WATCHED = ("l_elbow", "r_elbow", "l_knee", "r_knee", "l_wrist", "r_wrist", "l_ankle", "r_ankle", "head", "pelvis")
+WATCHED = ("head", "pelvis", *(f"{side}_{role}" for role in LIMB_ROLES for side in SIDES))
+"""What an obstacle keeps out."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ class TaskSolver:
         rows: The list.
         flext: Limbs by FLEXT tasks, else by plain positions.
         limits: Keep every joint within its limits.
-        obstacles: Name of a row -> its shape and its place (7,); they keep elbows, knees, hands, feet and head out.
+        obstacles: Name of a row -> its shape and its place (7,); joints stay out.
     """
 
     def __init__(
@@ -114,7 +117,7 @@ class TaskSolver:
         return self._figure
 
     def solve(self, points: ArrayLike, previous: Solution | None = None, dt: float = 1 / 60) -> Solution:
-        """Pose the figure for one frame of six points (6, 3) [m]; the residual is that of the six, 0 where off."""
+        """Pose the figure for six points (6, 3) [m]; the residual is that of the six, 0 where one is off."""
         frame = as_points(points)
         goals = {EFFECTORS[k]: frame[k] for k in self._on}
         start = self._starter.solve(frame).pose if previous is None else None
