@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import sixpoint as sp
+
 pytest.importorskip("viser", reason="viser is not installed: pip install 'sixpoint[viewer]'")
 sync_api = pytest.importorskip(
     "playwright.sync_api", reason="Playwright is not installed: pip install playwright"
 )
 
-import sixpoint as sp
-from sixpoint.jobs.view.clips import sample_clips
-from sixpoint.jobs.view.job import Page, open_page
-from sixpoint.jobs.view.session import Session
+from sixpoint.jobs.view.clips import sample_clips  # noqa: E402
+from sixpoint.jobs.view.job import Page, open_page  # noqa: E402
+from sixpoint.jobs.view.session import Session  # noqa: E402
 
 QUIET = (
     "--no-sandbox",
@@ -64,13 +65,14 @@ def wait_for(condition: Callable[[], Any], tab: Any, seconds: float = 30.0) -> N
         tab.wait_for_timeout(50)
 
 
-def look(browser: Any, page: Page) -> Any:
-    """A tab that shows the page."""
-    tab = browser.new_page(viewport={"width": 1100, "height": 750})
-    before = len(page.server.get_clients())
+def look(browser: Any, page: Page, width: int = 1000, height: int = 640) -> Any:
+    """A tab that shows the page, from where it should be looked at."""
+    tab = browser.new_page(viewport={"width": width, "height": height})
+    before = set(page.server.get_clients())
     tab.goto(page.address)
-    tab.get_by_text("six points").wait_for(timeout=60_000)
-    wait_for(lambda: len(page.server.get_clients()) > before, tab)
+    wait_for(lambda: set(page.server.get_clients()) - before, tab, 60)
+    camera = page.server.get_clients()[max(page.server.get_clients())].camera
+    wait_for(lambda: np.allclose(camera.look_at, page.server.initial_camera.look_at, atol=1e-3), tab)
     return tab
 
 
@@ -158,14 +160,17 @@ def test_the_method_is_switched_and_a_recording_scrubbed(browser, page):
 
 def test_five_browsers_and_one_that_closes_while_dragging(browser, page):
     """Five tabs see the page; one is closed in the middle of a drag, and the others go on."""
-    tabs, session = [look(browser, page) for _ in range(5)], page.session
-    drag(tabs[-1], on_screen(page, session.points[L_WRIST]), (40.0, -40.0), drop=False)
-    wait_for(lambda: session.solution is not None, tabs[-1])
-    tabs[-1].close()
-    wait_for(lambda: len(page.server.get_clients()) == 4, tabs[0])
-    tabs[0].get_by_role("button", name="Reset").click()
-    wait_for(lambda: session.solution is None, tabs[0])
-    tabs[1].get_by_role("button", name="Play").click()
-    wait_for(lambda: session.playing and session.frame > 5, tabs[1])
-    for tab in tabs[:-1]:
-        tab.close()
+    first, session = look(browser, page), page.session
+    drag(first, on_screen(page, session.points[L_WRIST]), (40.0, -40.0), drop=False)
+    wait_for(lambda: session.solution is not None, first)
+    others = [look(browser, page), *(look(browser, page, 160, 120) for _ in range(3))]
+    assert len(page.server.get_clients()) == 5
+    first.close()
+    for small in others[1:]:
+        small.close()
+    wait_for(lambda: len(page.server.get_clients()) == 1, others[0])
+    others[0].get_by_role("button", name="Reset").click()
+    wait_for(lambda: session.solution is None, others[0])
+    others[0].get_by_role("button", name="Play").click()
+    wait_for(lambda: session.playing and session.frame > 5, others[0])
+    others[0].close()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
@@ -19,8 +20,11 @@ from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.reconstruct import STATURE, Body
 from sixpoint.samples import SAMPLES, make_sample
 
+Array = NDArray[np.float64]
+
 STANDING = "standing"
 FREE_RATE = 60.0
+NEAR = 0.7  # from the beginning [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +115,19 @@ def _free_figure(body: Body, reading: Reading, limits: Limits | None) -> Figure:
     return Figure.from_motion(opened.whole, body.mapping, limits)
 
 
-def known_rotations(clip: Clip, frame: int) -> np.ndarray:
+def known_rotations(clip: Clip, frame: int) -> Array:
     """(6, 4) rotations of the effectors in a frame; the identity where unknown."""
     if clip.targets.rotations is None:
         return np.tile(rot.IDENTITY, (6, 1))
     turned = clip.targets.rotations[frame].copy()
     turned[~np.all(np.isfinite(turned), axis=1)] = rot.IDENTITY
     return turned
+
+
+def find_middle(clip: Clip) -> Array:
+    """(3,) where to look: the middle of the pelvis' way, if that is near its beginning [m]."""
+    pelvis = clip.targets.positions[:, 0]
+    known = pelvis[np.all(np.isfinite(pelvis), axis=1)]
+    if not len(known):
+        return np.array([0.0, 1.0, 0.0])
+    return np.asarray(known[0] + np.clip(known.mean(axis=0) - known[0], -NEAR, NEAR))

@@ -22,7 +22,7 @@ from sixpoint.body.motion import Motion, Pose
 from sixpoint.errors import SixpointError
 from sixpoint.jobs.reconstruct import finish
 from sixpoint.jobs.view import readout
-from sixpoint.jobs.view.clips import Clip, known_rotations
+from sixpoint.jobs.view.clips import Clip, find_middle, known_rotations
 from sixpoint.jobs.view.inbox import Inbox
 from sixpoint.jobs.view.posing import (
     Posing,
@@ -181,8 +181,7 @@ class Session:
         self.scene.set_figure(clip.figure)
         self.panel.set_playing(False)
         self.panel.set_clip(clip.name, len(clip.targets), clip.truth is not None)
-        known = clip.targets.positions[np.isfinite(clip.targets.positions[:, 0, 0]), 0]
-        middle = known.mean(axis=0) if len(known) else np.zeros(3)
+        middle = find_middle(clip)
         self.scene.look_at(middle)
         self._places = self._places or [place + np.append(middle, np.zeros(4)) for place in PLACES]
         self._show_posing()
