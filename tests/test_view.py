@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import socket
 import threading
 import time
@@ -453,3 +454,22 @@ def test_without_viser_the_command_says_how_to_get_it(capsys, monkeypatch):
     for words in (["view"], ["demo", "--view"]):
         assert main(words) == 2
         assert 'pip install "sixpoint[viewer]"' in capsys.readouterr().err
+
+
+def test_another_method_keeps_what_is_dragged(session):
+    """A method chosen while dragging poses the same points; the scrubber then shows that method's frame."""
+    goal = session.points[L_WRIST] + [0.0, 0.1, 0.1]
+    go_on(session, ("drag", (L_WRIST, goal, UNTURNED)), ("method", "pik"))
+    np.testing.assert_allclose(session.points[L_WRIST], goal, atol=1e-4)
+    assert np.linalg.norm(shown_points(session)[L_WRIST] - goal) < 0.01
+    go_on(session, ("frame", 12))
+    expected = make_solver("pik", session.clip.figure).solve_motion(session.clip.targets)
+    assert session.frame == 12
+    np.testing.assert_allclose(session.pose.rotations, expected.rotations[12], atol=1e-9)
+
+
+def test_python_of_the_docs_runs():
+    """The example of docs/view.md runs as it stands."""
+    text = (Path(__file__).parents[1] / "docs" / "view.md").read_text("utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    exec(compile(block, "view.md", "exec"), {})

@@ -301,14 +301,13 @@ class Session:
 
     def _show_frame(self, frame: int, moved: bool = True) -> None:
         """A frame of the recording, in place of what was dragged."""
-        if self.solved is None:
-            self.solution = None
-            self._solve_clip()
-            return
         frame = int(np.clip(frame, 0, len(self.clip.targets) - 1))
         if moved:
             self.time = frame / self.clip.targets.rate
         self.solution = None
+        if self.solved is None:
+            self._solve_clip()
+            return
         self.points = self.clip.targets.positions[frame].copy()
         self.rotations = known_rotations(self.clip, frame)
         motion = self.solved.motion
