@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib.util
 import re
 import socket
@@ -9,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,6 +117,31 @@ def test_a_joint_at_its_limit_is_found(clips):
         assert (elbow in find_limited(figure, motion.pose(0))) == found
         assert compute_limit_excess(figure, motion)[0, elbow] < 1e-9
     assert find_limited(figure, rest) == []
+
+
+def test_arrows_and_balls_report_what_is_dragged(clips):
+    """A ball reports the pointer plus where it was gripped, arrows their own place; both stay together."""
+    server, told = open_server(), []
+    try:
+        scene = Scene(server, lambda name, value: told.append((name, *value)))
+        scene.set_figure(clips[0].figure)
+        scene.set_targets(clips[0].targets.positions[0], clips[0].targets.rotations[0])
+        handle = scene._handles._all[L_WRIST]
+        start = handle.position
+        grip = SimpleNamespace(phase="start", start_position=start + [0, 0, 0.03])
+        asyncio.run(handle._on_drag(grip))
+        assert [h.selected for h in scene._handles._all] == [k == L_WRIST for k in range(6)]
+        asyncio.run(handle._on_drag(SimpleNamespace(phase="update", end_position=start + [0.2, 0, 0.03])))
+        np.testing.assert_allclose(told[-1][2], start + [0.2, 0, 0], atol=1e-9)
+        handle._gizmo.position, handle._gizmo.wxyz = start + [0, 0.1, 0], (0.0, 0.0, 1.0, 0.0)
+        asyncio.run(handle._on_gizmo(SimpleNamespace(phase="update")))
+        assert told[-1][:2] == ("drag", L_WRIST)
+        np.testing.assert_allclose(told[-1][2], start + [0, 0.1, 0], atol=1e-9)
+        np.testing.assert_allclose(told[-1][3], [0, 1, 0, 0], atol=1e-9)
+        scene.set_targets(np.full((6, 3), np.nan))
+        assert not handle.visible
+    finally:
+        close(server)
 
 
 # --- driving it ----------------------------------------------------------------------------------
