@@ -22,6 +22,7 @@ ALLOWED = {
     "live": {"live", "calibration", "signals", "kernels", "body", "errors"},
     "study": {"study", "signals", "body", "errors"},
     "studies": set(),
+    "viewer": {"viewer", "body", "errors"},
     "jobs": {
         "jobs",
         "live",
@@ -31,6 +32,7 @@ ALLOWED = {
         "samples",
         "datasets",
         "study",
+        "viewer",
         "body",
         "errors",
     },
@@ -49,7 +51,8 @@ LIBRARIES = {
     "live": {"numpy"},
     "solvers": {"numpy"},
     "study": {"numpy", "scipy", "matplotlib", "torch"},
-    "jobs": {"numpy"},
+    "viewer": {"numpy", "viser"},
+    "jobs": {"numpy", "viser"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
 """Room -> third-party libraries it may import."""
@@ -84,7 +87,7 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch"}:
+        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch", "viser"}:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

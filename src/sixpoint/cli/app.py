@@ -23,6 +23,7 @@ from sixpoint.cli.live import live
 from sixpoint.cli.reconstruct import reconstruct
 from sixpoint.cli.screen import Screen, messages
 from sixpoint.cli.study import study
+from sixpoint.cli.view import view
 from sixpoint.errors import SixpointError
 
 HELP = """Pose a whole human figure from six tracked points: pelvis, head, wrists and ankles.
@@ -36,7 +37,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, reconstruct, compare, convert, info, live, study, data):
+    for command in (demo, view, reconstruct, compare, convert, info, live, study, data):
         app.command(command)
     return app
 

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from sixpoint.cli.options import Force, NoLimits
 from sixpoint.cli.screen import Screen
+from sixpoint.cli.view import show_page
 
 if TYPE_CHECKING:
     from sixpoint.jobs.demo import DemoClip
@@ -39,10 +40,14 @@ def demo(
     stature: Annotated[float, Parameter(help="Stature of the figure [m].")] = 1.75,
     no_limits: NoLimits = False,
     force: Force = False,
+    view: Annotated[
+        bool, Parameter(negative="", help="Open them on a page in the browser instead; writes nothing.")
+    ] = False,
 ) -> None:
     """Reconstruct built-in motions from six points, and show how well it went. Needs no file.
 
-    Writes the true motion, the result (BVH), the six points (CSV) and a picture of each.
+    Writes the true motion, the result (BVH), the six points (CSV) and a picture of each. With --view they are
+    on a page, where the six points can be dragged (see `sixpoint view`).
 
     For example:
 
@@ -50,8 +55,12 @@ def demo(
     sixpoint demo
     sixpoint demo --sample boxing walk --out /tmp/demo
     sixpoint demo --force --no-limits
+    sixpoint demo --view
     ```
     """
+    if view:
+        show_page(lambda clips: clips.sample_clips(sample or (), stature), limits=not no_limits)
+        return
     from sixpoint.jobs import demo as job
     from sixpoint.jobs.solving import Solving
 
@@ -97,6 +106,7 @@ def _point_on(screen: Screen, out: Path, name: str) -> None:
             (f"look at {out / name}.png", "the result over the truth; open the .bvh files in Blender"),
             (f"sixpoint info {out / name}_truth.bvh", "what a file holds"),
             (f"sixpoint reconstruct {out / name}_points.csv", "pose a body from six points"),
+            ("sixpoint demo --view", "drag them in the browser; needs the extra [viewer]"),
             ("sixpoint demo --force --no-limits", "free joints: every reachable point is met exactly"),
             ("sixpoint reconstruct RECORDING", "the same with your own .bvh or .amc"),
         ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from scipy.spatial import ConvexHull
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
+from sixpoint.body.mannequin import Mannequin
 from sixpoint.body.motion import Motion
 from sixpoint.study.canvas import (
     DPI,
@@ -41,6 +41,7 @@ from sixpoint.study.canvas import (
 Array = NDArray[np.float64]
 
 GAP = 0.16  # between the figures of a strip, in units of the figure
+COLOURS = {"left": LEFT, "right": RIGHT, "trunk": TRUNK}
 VIEW_YAW, VIEW_PITCH = np.radians(38), np.radians(9)
 
 
@@ -165,55 +166,15 @@ def _posed(figure: Figure) -> list[int]:
     return sorted({r.pelvis, *r.spine, *limbs})
 
 
-def _tips(figure: Figure, joint: int) -> list[int]:
-    """Farthest joint or site below a joint, and its heel if it has one: rows of joints then sites."""
-    sk = figure.skeleton
-    below = [j for j in range(joint + 1, len(sk)) if sk.path(joint, j)]
-    sites = [len(sk) + s for s in range(len(sk.site_names)) if sk.site_parents[s] in (joint, *below)]
-    pose = figure.neutral_pose
-    places = _places(figure, *pose.compute_transforms())
-    found = sorted(below + sites, key=lambda k: -float(np.linalg.norm(places[k] - places[joint])))
-    heel = [k for k in sites if "heel" in sk.site_names[k - len(sk)].lower()]
-    return [k for k in found[:1] if np.linalg.norm(places[k] - places[joint]) > 0.02] + heel
-
-
 def _places(figure: Figure, positions: Array, world: Array) -> Array:
     return np.concatenate([positions, figure.skeleton.compute_sites(positions, world)], axis=-2)
 
 
 def _parts(figure: Figure, positions: Array, world: Array, slim: bool) -> list[_Part]:
-    """A mannequin: capsules for limbs, hulls for the trunk, a ball for the head."""
-    r, unit = figure.roles, figure.height / 1.6
-    p = _places(figure, positions, world)
-    up = rot.mul(world[r.head], rot.inv(figure.neutral[r.head]))
-    lift = [0, 0.03, 0.01] if np.any(r.head_offset) else [0, 0.065, 0.02]
-    skull = p[r.head] + rot.mul_vec(world[r.head], r.head_offset) + rot.mul_vec(up, np.array(lift) * unit)
-    thin = 0.55 if slim else 1.0
-
-    def part(colour: str, centres: Sequence[Array], *radii: float) -> _Part:
-        return _Part(np.array(centres), np.array(radii) * unit * thin, colour)
-
-    trunk = [p[r.pelvis], *p[list(r.spine)]]
-    waist, chest = trunk[len(trunk) // 3], trunk[-3 if len(trunk) > 4 else -2]
-    parts = [part(TRUNK, [trunk[-1], chest], 0.048, 0.055)]
-    if slim:
-        parts += [part(TRUNK, pair, 0.05, 0.05) for pair in pairwise(trunk)]
-        parts += [part(TRUNK, [p[r.pelvis], p[k]], 0.045, 0.045) for k in r.hip]
-        parts += [part(TRUNK, [chest, p[k]], 0.045, 0.045) for k in r.shoulder]
-    else:
-        parts.append(part(TRUNK, [p[r.hip[0]], p[r.hip[1]], waist], 0.088, 0.088, 0.105))
-        ribs = [p[r.shoulder[0]], p[r.shoulder[1]], waist, chest]
-        parts.append(part(TRUNK, ribs, 0.058, 0.058, 0.105, 0.09))
-    for k, colour in enumerate((LEFT, RIGHT)):
-        parts.append(part(colour, [p[r.hip[k]], p[r.knee[k]]], 0.08, 0.056))
-        parts.append(part(colour, [p[r.knee[k]], p[r.ankle[k]]], 0.054, 0.037))
-        parts.append(part(colour, [p[r.shoulder[k]], p[r.elbow[k]]], 0.05, 0.04))
-        parts.append(part(colour, [p[r.elbow[k]], p[r.wrist[k]]], 0.039, 0.028))
-        foot, hand = _tips(figure, r.ankle[k]), _tips(figure, r.wrist[k])
-        parts.append(part(colour, [p[r.ankle[k]], *p[foot]], 0.036, *[0.024] * len(foot)))
-        parts.append(part(colour, [p[r.wrist[k]], *p[hand]], 0.03, *[0.022] * len(hand)))
-    thin = 0.85 if slim else 1.0
-    return [*parts, part(TRUNK, [skull - 0.012 * unit * rot.mul_vec(up, [0, 1, 0]), skull], 0.085, 0.095)]
+    """The mannequin of one frame, in colours."""
+    body = Mannequin.of(figure, slim)
+    centres = body.place(positions, world)
+    return [_Part(centres[p.balls], body.radii[p.balls], COLOURS[p.side]) for p in body.parts]
 
 
 def _camera(figure: Figure, motion: Motion, shown: Sequence[int], turn: float) -> Array:
