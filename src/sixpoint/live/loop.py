@@ -1,8 +1,8 @@
 """The live loop: datagrams in, poses solved as soon as a set is complete, datagrams out.
 
 One thread, one selector. All that waits on a socket is read at once; a set that is complete is solved and
-sent, but where many wait the newest wins, so that no backlog builds up. A timer only fills gaps. Sending never
-waits: what a full or closed receiver does not take is counted and gone. No packet ends the loop.
+sent, but where many wait the newest wins, so that no backlog builds up. A timer only fills gaps. Sending
+never waits: what a full or closed receiver does not take is counted and gone. No packet ends the loop.
 """
 
 from __future__ import annotations
