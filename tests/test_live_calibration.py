@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -123,3 +125,26 @@ def test_the_command_runs_and_says_how_it_went(capsys, tmp_path):
     ):
         assert main(["live", *words, "--duration", "0.1"]) == 2
         assert message in capsys.readouterr().err
+
+
+def test_the_page_of_a_live_session_follows(monkeypatch):
+    """With --view the newest frame is drawn, whoever's figure it is; the loop is not kept waiting."""
+    pytest.importorskip("viser", reason="the page needs viser: pip install 'sixpoint[viewer]'")
+    from sixpoint.jobs.live_view import LiveView
+    from sixpoint.live.loop import Channel
+
+    session = Session(FIGURE, sp.SequentialIKPlus(FIGURE))
+    channel, page = Channel(session, "plain", 0), LiveView(sp.Figure.from_stature(1.6))
+    try:
+        assert page.address[0].startswith("http://127.0.0.1:") and not page.address[1]
+        targets = FIGURE.targets(sp.make_sample("walk", FIGURE))
+        for k in range(30):
+            session.receive(packet(targets, k, EFFECTORS), k / 60)
+            page.watch(channel, session.solve(k / 60))
+        for _ in range(100):
+            if page._newest is None and page._scene.figure is FIGURE:
+                break
+            time.sleep(0.05)
+        assert page._scene.figure is FIGURE
+    finally:
+        page.close()

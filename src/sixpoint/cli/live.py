@@ -13,6 +13,7 @@ from cyclopts import Parameter
 
 from sixpoint.cli.options import Force
 from sixpoint.cli.screen import Screen
+from sixpoint.cli.view import check_viser
 
 KEYS = "p pause, r recentre, c calibrate, n begin anew, q quit (and Enter)"
 WAIT = 3.0  # s, before a calibration begins
@@ -56,6 +57,9 @@ def live(
         bool, Parameter(negative="", help="Find roles, mounts and lengths first: stand still, then move.")
     ] = False,
     record: Annotated[Path | None, Parameter(help="Record all that arrives to this file.")] = None,
+    view: Annotated[
+        bool, Parameter(negative="", help="Show the body in the browser; needs sixpoint[viewer].")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Pose an avatar live from trackers that arrive over the network.
@@ -68,6 +72,7 @@ def live(
 
     ```
     sixpoint live --vmc-in 39540 --vmc-out 127.0.0.1:39539
+    sixpoint live --vmc-in 39540 --view
     sixpoint live --vrchat-in 9000 --vmc-out 39539 --smoothing light
     sixpoint live --plain-in 5005 --vrchat-out 9000 --record take.jsonl
     sixpoint live --vmc-in 39540 --vmc-out 39539 --profile me.toml --calibrate
@@ -116,6 +121,14 @@ def live(
         raise SixpointError(f"{profile} exists; use --force to calibrate anew")
     loop = settings.make_loop()
     channel = loop.channels[0]
+    page = None
+    if view:
+        check_viser()
+        from sixpoint.jobs.live_view import LiveView
+
+        page = LiveView(channel.session.figure)
+        loop.watch = page.watch
+        screen.say(f"look at {page.address[0]}")
     screen.say(f"listening for {protocol} on {host}:{channel.port}; {KEYS}")
     if host not in ("127.0.0.1", "localhost"):
         screen.note(f"{host} can be reached from other machines: anybody on the network may send trackers")
@@ -182,6 +195,8 @@ def live(
         pass
     finally:
         loop.close()
+        if page is not None:
+            page.close()
         if loop.recorder is not None:
             loop.recorder.close()
     screen.say(channel.statistics.line())

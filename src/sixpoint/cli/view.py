@@ -74,6 +74,12 @@ def view(
     )
 
 
+def check_viser() -> None:
+    """Refuse a page where viser is not installed."""
+    if importlib.util.find_spec("viser") is None:
+        raise SixpointError('the viewer needs viser, which is not installed: pip install "sixpoint[viewer]"')
+
+
 def show_page(
     open_clips: Callable[[ModuleType], list[Any]],
     *,
@@ -98,8 +104,7 @@ def show_page(
     Raises:
         SixpointError: viser is not installed, or the page cannot be opened.
     """
-    if importlib.util.find_spec("viser") is None:
-        raise SixpointError('the viewer needs viser, which is not installed: pip install "sixpoint[viewer]"')
+    check_viser()
     from sixpoint.jobs.view import clips
     from sixpoint.jobs.view.job import open_page
     from sixpoint.jobs.view.posing import Posing
