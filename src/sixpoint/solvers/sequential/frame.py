@@ -145,8 +145,11 @@ def pose_trunk(model, settings, points, local, memory, residual, scratch):
 
 
 @helper
-def place_limb(model, settings, limb, root, target, local, world, segs):
-    """World rotation and place of what carries a limb: 0 and 1 are the arms, 2 and 3 the legs."""
+def place_limb(model, limits, hold, limb, root, target, local, world, segs):
+    """World rotation and place of what carries a limb: 0 and 1 are the arms, 2 and 3 the legs.
+
+    ``hold``: whether clavicles start from the last frame's.
+    """
     if limb >= 2:
         return place_leg(model.hips, limb - 2, root, world)
     return place_arm(
@@ -155,8 +158,8 @@ def place_limb(model, settings, limb, root, target, local, world, segs):
         model.clavicles,
         model.limbs,
         model.balls,
-        settings.limits,
-        settings.hold_clavicles,
+        limits,
+        hold,
         limb,
         root,
         target,
@@ -176,7 +179,9 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
         if filled[limb + 2, 3] == 0.0:
             continue
         target = vec.load(filled, limb + 2)
-        frame, place = place_limb(model, settings, limb, root, target, local, world, segs)
+        frame, place = place_limb(
+            model, settings.limits, settings.hold_clavicles, limb, root, target, local, world, segs
+        )
         row = limb_row(segs.shape[0], limb)
         upper, hinge, end = solve_limb(
             qt.inv_mul_vec(frame, vec.sub(target, place)),

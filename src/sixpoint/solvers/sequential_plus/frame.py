@@ -9,7 +9,7 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
 from sixpoint.kernels.swing_twist import clamp
-from sixpoint.solvers.sequential.frame import place_arm, place_leg
+from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
 from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
@@ -146,28 +146,6 @@ def pole_of_start(given, limb, n, frame):
 
 
 @helper
-def place_limb(model, s, limb, root, target, local, world, segs):
-    """World rotation and place of what carries a limb: 0 and 1 are the arms, 2 and 3 the legs."""
-    if limb >= 2:
-        return place_leg(model.hips, limb - 2, root, world)
-    return place_arm(
-        model.chest,
-        model.girdle,
-        model.clavicles,
-        model.limbs,
-        model.balls,
-        s.limits,
-        False,
-        limb,
-        root,
-        target,
-        world,
-        segs,
-        local,
-    )
-
-
-@helper
 def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual):
     """A limb whose middle joint points to ``pole``, and its extremity."""
     count = model.segments.shape[0]
@@ -210,7 +188,7 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
         if filled[limb + 2, 3] == 0.0:
             continue
         target = vec.load(filled, limb + 2)
-        frame, place = place_limb(model, s, limb, root, target, local, world, segs)
+        frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         n = vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place)))
         pole = point_limb(s, limb, n, frame, turned)
         pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
@@ -232,7 +210,7 @@ def solve_frame_from(model, s, points, turned, given, local, memory, residual, s
         if filled[limb + 2, 3] == 0.0:
             continue
         target = vec.load(filled, limb + 2)
-        frame, place = place_limb(model, s, limb, root, target, local, world, segs)
+        frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         pole = pole_of_start(given, limb, vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place))), frame)
         pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
     return judge(lost, residual)

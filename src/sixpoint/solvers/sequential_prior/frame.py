@@ -12,10 +12,10 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
 from sixpoint.kernels.swing_twist import clamp
+from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential_plus.frame import (
     end_trunk,
-    place_limb,
     point_limb,
     pose_limb,
     start_trunk,
@@ -192,7 +192,7 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
         if filled[limb + 2, 3] == 0.0:
             continue
         target = vec.load(filled, limb + 2)
-        frame, place = place_limb(model, s, limb, root, target, local, world, segs)
+        frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         gap = vec.sub(target, place)
         plain = point_limb(s, limb, vec.unit(qt.inv_mul_vec(frame, gap)), frame, turned)
         base = qt.load(world, model.chest[limb] if limb < 2 else 0)

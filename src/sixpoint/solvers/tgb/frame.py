@@ -27,7 +27,9 @@ def solve_frame(model, settings, weight, points, local, memory, residual, scratc
         if filled[limb + 2, 3] == 0.0:
             continue
         target = vec.load(filled, limb + 2)
-        frame, place = place_limb(model, settings, limb, root, target, local, world, segs)
+        frame, place = place_limb(
+            model, settings.limits, settings.hold_clavicles, limb, root, target, local, world, segs
+        )
         row = limb_row(segs.shape[0], limb)
         upper, hinge, end = solve_easiest(
             qt.inv_mul_vec(frame, vec.sub(target, place)),
