@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from sixpoint.body.targets import EFFECTORS
-from sixpoint.calibration.profile import format_profile, parse_profile
+from sixpoint.calibration.mounts import Mount
+from sixpoint.calibration.profile import Profile, Worn, format_profile, parse_profile
 from sixpoint.cli import main
-from sixpoint.jobs.live import Live, mounts_of, parse_address, roles_of
+from sixpoint.jobs.live import FitCheck, Live, mounts_of, parse_address, roles_of
 from sixpoint.live.calibrating import MOVING, READY, STILL, Calibrating
 from sixpoint.live.readings import Packet, Reading
 from sixpoint.live.session import Session
@@ -148,3 +149,29 @@ def test_the_page_of_a_live_session_follows(monkeypatch):
         assert page._scene.figure is FIGURE
     finally:
         page.close()
+
+
+def test_a_profile_of_somebody_else_is_said():
+    """After three seconds of readings: nothing for the person, a warning for a far shorter one's profile."""
+    targets = FIGURE.targets(sp.make_sample("walk", FIGURE))
+    plain = Mount(np.zeros(3), np.array([0.0, 0, 0, 1]))
+    worn = {name: Worn(name, plain) for name in EFFECTORS}
+    for stature, fits in ((1.72, True), (1.2, False)):
+        check, session = FitCheck(Profile(stature, trackers=worn)), Session(FIGURE, None)
+        assert check.take({}) is None
+        for k in range(FitCheck.SAMPLES):
+            session.receive(packet(targets, k, EFFECTORS), k / 10)
+            said = check.take(session.seen)
+        assert (said == ()) is fits
+
+
+def test_a_calibration_does_not_replace_a_profile_unasked(tmp_path):
+    """A file that exists is kept without force."""
+    path = tmp_path / "me.toml"
+    profile = Profile(1.7)
+    Live(profile=path).keep_profile(profile)
+    with pytest.raises(sp.FormatError, match="exists"):
+        Live(profile=path).keep_profile(Profile(1.9))
+    assert Live(profile=path).read_profile().stature == 1.7
+    Live(profile=path).keep_profile(Profile(1.9), force=True)
+    assert Live(profile=path).make_session().figure.height > Live().make_session().figure.height

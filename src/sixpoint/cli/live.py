@@ -83,12 +83,11 @@ def live(
         VMC_IN,
         VMC_OUT,
         VRCHAT_OUT,
+        FitCheck,
         Live,
-        mounts_of,
         parse_address,
-        parse_rotations,
-        roles_of,
     )
+    from sixpoint.jobs.solving import parse_rotations
     from sixpoint.live.calibrating import Calibrating
 
     screen = Screen()
@@ -105,7 +104,7 @@ def live(
         vrchat_out=tuple(parse_address(text, VRCHAT_OUT) for text in vrchat_out or ()),
         method=method,
         stature=stature,
-        rotations=parse_rotations(rotations),
+        rotations=parse_rotations(rotations or ""),
         limits=not no_limits,
         smoothing=smoothing,
         posture=posture,
@@ -139,11 +138,18 @@ def live(
         threading.Thread(target=_read_keys, args=(keys,), daemon=True).start()
     told = 0.0
     said = ""
+    known = None if calibrate else settings.read_profile()
+    check = None if known is None else FitCheck(known)
     if calibrate:
         channel.calibrating = Calibrating(time.perf_counter() + WAIT)
 
     def tick(elapsed: float) -> None:
-        nonlocal told
+        nonlocal told, check
+        misfits = None if check is None else check.take(channel.session.seen)
+        if misfits is not None:
+            check = None
+            for text in misfits:
+                screen.note(f"the profile may not fit: {text}", "warning", "yellow")
         while not keys.empty():
             key = keys.get()
             if key == "p":
@@ -175,19 +181,18 @@ def live(
         channel.calibrating = None
         try:
             outcome = going.finish()
-            settings.keep_profile(outcome.profile, force=True)
         except SixpointError as error:
             screen.note(str(error), "warning", "yellow")
             return
         for note in outcome.notes:
             screen.note(note)
-        fresh = settings.make_session() if profile is not None else None
-        if fresh is not None:
-            channel.session, channel.outputs = fresh, settings.make_outputs(fresh)
-            screen.say(f"calibrated: {profile}")
-        else:
-            channel.session.wear(roles_of(outcome.profile), mounts_of(outcome.profile))
-            screen.say("calibrated; give --profile FILE to keep it")
+        channel.session = settings.make_session(outcome.profile)
+        channel.outputs = settings.make_outputs(channel.session)
+        try:
+            settings.keep_profile(outcome.profile, force=force)
+            screen.say(f"calibrated: {profile}" if profile else "calibrated; --profile FILE would keep it")
+        except SixpointError as error:
+            screen.note(f"calibrated, but not kept: {error}", "warning", "yellow")
 
     try:
         loop.run(duration, tick)

@@ -11,11 +11,13 @@ import numpy as np
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import EFFECTORS
+from sixpoint.calibration.misfits import find_misfits
 from sixpoint.calibration.mounts import Mount
 from sixpoint.calibration.profile import Profile, format_profile, parse_profile
 from sixpoint.errors import FormatError, SixpointError
 from sixpoint.formats.atomic import write_files
 from sixpoint.live.loop import Channel, LiveLoop, Output
+from sixpoint.live.readings import Reading
 from sixpoint.live.record import RecordingWriter
 from sixpoint.live.session import Frame, Session
 from sixpoint.live.stance import Posture
@@ -64,13 +66,16 @@ class Live:
     record: Path | None = None
     profile: Path | None = None
 
-    def make_session(self) -> Session:
+    def make_session(self, known: Profile | None = None) -> Session:
         """The session, its kernels compiled.
+
+        Args:
+            known: The person; that of the profile's file by default.
 
         Raises:
             SixpointError: A setting is impossible; the message says what would work.
         """
-        known = self.read_profile()
+        known = known or self.read_profile()
         figure = Figure.from_stature(self.stature) if known is None else known.figure()
         options: dict[str, object] = {} if self.limits else {"limits": False}
         rotations = self.rotations
@@ -147,6 +152,35 @@ class Live:
         return LiveLoop([channel], rate=self.rate, recorder=recorder, watch=watch)
 
 
+class FitCheck:
+    """Watches the first seconds of a session for signs that a profile is not of who is seen.
+
+    Args:
+        profile: What was loaded.
+    """
+
+    SAMPLES = 30  # readings that are looked at, at the ten a second of the loop's tick
+
+    def __init__(self, profile: Profile) -> None:
+        self._profile = profile
+        self._seen: list[dict[str, Reading]] = []
+
+    def take(self, seen: dict[str, Reading]) -> tuple[str, ...] | None:
+        """Note what is seen; the misfits when enough was, before that None."""
+        if seen:
+            self._seen.append(seen)
+        if len(self._seen) < self.SAMPLES:
+            return None
+        nowhere = (np.nan,) * 3
+        places = {
+            serial: np.array(
+                [frame[serial].position or nowhere if serial in frame else nowhere for frame in self._seen]
+            )
+            for serial in sorted({name for frame in self._seen for name in frame})
+        }
+        return find_misfits(self._profile, places)
+
+
 def roles_of(profile: Profile) -> dict[str, str]:
     """Serial -> point."""
     return {serial: worn.point for serial, worn in profile.trackers.items()}
@@ -173,9 +207,3 @@ def parse_address(text: str, port: int) -> tuple[str, int]:
     if not 0 < value < 65536:
         raise SixpointError(f"{text!r} is no address: give host:port with a port of 1 to 65535")
     return host or "127.0.0.1", value
-
-
-def parse_rotations(text: str | None) -> tuple[str, ...]:
-    """Effectors as ``pelvis,head`` or ``all``."""
-    names = tuple(filter(None, (word.strip() for word in (text or "").split(","))))
-    return EFFECTORS if names == ("all",) else names

@@ -117,11 +117,6 @@ class Session:
         self._solved_at: float | None = None
         self.last: Frame | None = None
 
-    def wear(self, roles: Mapping[str, str], mounts: Mapping[str, Mount]) -> None:
-        """Take new roles and mounts, as after a calibration, and begin anew."""
-        self.roles, self.mounts = _checked(roles, mounts)
-        self.forget()
-
     def recentre(self) -> None:
         """The tracking space was moved: take new places as they come, without calling them jumps."""
         self._tracking.recentre()

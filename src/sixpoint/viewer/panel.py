@@ -200,10 +200,6 @@ class Panel:
             group.options = (UP, DOWN, ON if on else OFF)
         self._tasks_folder.visible = bool(rows)
 
-    def set_obstacle(self, number: int, shown: bool) -> None:
-        """Whether an obstacle's box is ticked."""
-        self._obstacles[number].value = shown
-
     def say(self, html: str) -> None:
         """The lines on top, as HTML: the caller escapes what is not its own."""
         if self._status.content != html:
