@@ -28,6 +28,7 @@ from sixpoint.body.mapping import read_mapping
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.neutral import compute_neutral
 from sixpoint.body.roles import Roles, find_roles
+from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton, frozen
 from sixpoint.body.spine_chain import COINCIDENT, SpineChain
 from sixpoint.body.targets import Targets
@@ -48,6 +49,7 @@ class Figure:
         neutral: (J, 4) world rotation of each rig frame in the neutral pose.
         dofs: Limits of the posed joints, in anatomical frames.
         name: For messages.
+        shape: Its surface, if it has one.
     """
 
     skeleton: Skeleton
@@ -55,12 +57,18 @@ class Figure:
     neutral: Array
     dofs: Dofs
     name: str = "figure"
+    shape: Shape | None = None
 
     def __repr__(self) -> str:
         return f"Figure({self.name!r}, {len(self.skeleton)} joints, height {self.height:.3f} m)"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "neutral", frozen(self.neutral))
+        if self.shape is not None and len(self.shape.bind_positions) != len(self.skeleton):
+            raise FigureError(
+                f"the shape is bound to {len(self.shape.bind_positions)} joints, "
+                f"the skeleton has {len(self.skeleton)}"
+            )
 
     # --- construction ----------------------------------------------------------------------------
 
@@ -122,6 +130,10 @@ class Figure:
     def with_limits(self, limits: Limits) -> Figure:
         """The same figure with other joint limits."""
         return replace(self, dofs=self._compute_dofs(limits))
+
+    def with_shape(self, shape: Shape | None) -> Figure:
+        """The same figure with another surface, or with none."""
+        return replace(self, shape=shape)
 
     def full_dofs(self, limits: Limits | None = None) -> Dofs:
         """The figure's degrees of freedom with those of forearms, wrists and ankles.
