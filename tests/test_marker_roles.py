@@ -14,13 +14,14 @@ SIDED_CMU = "FWT BWT THI KNE SHN ANK HEE TOE MT5 FHD BHD SHO UPA ELB FRM WRA WRB
 SIDED_RIZZOLI = "ASIS PSIS GT LE HF TT LM CA FM SM VM ME MM"
 SIDED_HAYES = "Shoulder Elbow Wrist ASIS Thigh Knee Shank Ankle Heel Toe"
 BODY = """nose left_eye_inner left_eye left_eye_outer right_eye_inner right_eye right_eye_outer left_ear
-    right_ear mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist
-    left_pinky right_pinky left_index right_index left_thumb right_thumb left_hip right_hip left_knee right_knee
-    left_ankle right_ankle left_heel right_heel left_foot_index right_foot_index"""
+    right_ear mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist
+    right_wrist left_pinky right_pinky left_index right_index left_thumb right_thumb left_hip
+    right_hip left_knee right_knee left_ankle right_ankle left_heel right_heel left_foot_index
+    right_foot_index"""
 BASELINE = """HeadTop HeadFront HeadSide BackTop Chest BackLeft BackRight WaistLFront WaistRFront WaistLBack
-    WaistRBack LShoulderBack RShoulderBack LShoulderTop RShoulderTop LElbowOut RElbowOut LUArmHigh RUArmHigh
-    LWristOut RWristOut LWristIn RWristIn LHandOut RHandOut LThighFront RThighFront LKneeOut RKneeOut LShin RShin
-    LAnkleOut RAnkleOut LToeOut RToeOut LToeIn RToeIn"""
+    WaistRBack LShoulderBack RShoulderBack LShoulderTop RShoulderTop LElbowOut RElbowOut LUArmHigh
+    RUArmHigh LWristOut RWristOut LWristIn RWristIn LHandOut RHandOut LThighFront RThighFront
+    LKneeOut RKneeOut LShin RShin LAnkleOut RAnkleOut LToeOut RToeOut LToeIn RToeIn"""
 
 PLUG_IN_GAIT = [f"{s}{name}" for s in "LR" for name in SIDED_GAIT.split()]
 PLUG_IN_GAIT += ["C7", "T10", "CLAV", "STRN", "RBAK"]
