@@ -1,4 +1,4 @@
-"""Files to motions, targets and markers, and back, and joint angles to files; ``load`` and ``save`` choose by suffix.
+"""Files to motions, targets and markers, and back; joint angles to files. The suffix says which format.
 
 Degrees, inches, centimetres and Z-up worlds exist only in this room: what comes out is in metres, radians
 and Y up, and what goes into a file is in the unit and axes of the file it once came from. Reading raises
