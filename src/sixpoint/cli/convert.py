@@ -12,8 +12,8 @@ from sixpoint.cli.screen import Screen
 
 
 def convert(
-    source: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .asf) or six points (.csv, .npz).")],
-    out: Annotated[Path, Parameter(help="A motion (.bvh, .amc with its .asf) or six points (.csv, .npz).")],
+    source: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .asf, .usd) or six points (.csv, .npz).")],
+    out: Annotated[Path, Parameter(help="A motion (.bvh, .usd, .amc with its .asf) or six points.")],
     /,
     *,
     skeleton: Skeleton = None,
@@ -39,6 +39,7 @@ def convert(
 
     ```
     sixpoint convert 17_10.amc boxing.bvh --out-unit cm
+    sixpoint convert boxing.bvh boxing.usdc
     sixpoint convert boxing.bvh boxing_points.csv
     sixpoint convert boxing_points.csv boxing_points.npz --frames 0:600
     ```

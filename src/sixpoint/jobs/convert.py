@@ -9,11 +9,12 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError
-from sixpoint.formats import TARGET_SUFFIXES, save, save_targets
+from sixpoint.formats import OUTPUT_SUFFIXES, TARGET_SUFFIXES, load_shape, save, save_targets
+from sixpoint.formats.usd import USD_SUFFIXES
 from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.writing import check_output, keep_sources
 
-OUTPUTS = (".bvh", ".amc", *TARGET_SUFFIXES)
+OUTPUTS = (*OUTPUT_SUFFIXES, *TARGET_SUFFIXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,9 @@ def convert(
         opened = open_motion(source, reading)
         keep_sources(files, [source, opened.skeleton])
         content = opened.motion
-        save(content, out, force=force, unit=out_unit, up=out_up)
+        surfaces = {source.suffix.lower(), out.suffix.lower()} <= set(USD_SUFFIXES)
+        shape = load_shape(source) if surfaces else None
+        save(content, out, force=force, unit=out_unit, up=out_up, shape=shape)
     return Conversion(content, files)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
-from sixpoint.body.retargeting import Ends, Mode, carry_points
+from sixpoint.body.reach import Ends
+from sixpoint.body.retargeting import Mode, carry_points
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.person import estimate_figure
 from sixpoint.errors import TargetError
