@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from sixpoint.formats.source import LARGEST
+
 Array = NDArray[np.float64]
 
 ALIKE = 2e-3  # scales that differ by less are the same: UsdSkel keeps them as half floats
@@ -44,11 +46,13 @@ def compose(rotations: Array, translations: Array) -> Array:
 
 
 def decompose(matrices: Array) -> Similarity | None:
-    """Parts of (..., 4, 4) matrices; None where one has a shear, a mirror or no size."""
+    """Parts of (..., 4, 4) matrices; None where one has a shear, a mirror, or no sane size."""
     matrices = np.asarray(matrices, float)
+    if not np.all(np.abs(matrices) < LARGEST):  # NaN is not
+        return None
     axes = matrices[..., :3, :3]
     scales = np.linalg.norm(axes, axis=-1)
-    if not (np.all(np.isfinite(matrices)) and np.all(scales > 1e-9)):
+    if not np.all(scales > 1e-9):
         return None
     turn = axes / scales[..., None]
     gram = turn @ np.swapaxes(turn, -1, -2)

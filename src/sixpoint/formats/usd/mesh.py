@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.shape import Shape
 from sixpoint.errors import FormatError
+from sixpoint.formats.source import LARGEST
 from sixpoint.formats.usd.matrices import ALIKE
 from sixpoint.formats.usd.rig import Rig
 
@@ -80,13 +81,15 @@ def _read_mesh(usd: Any, rig: Rig, query: Any, path: Path) -> tuple[Array, Index
         )
     if len(corners) and not (corners.min() >= 0 and corners.max() < len(points)):
         raise FormatError(path, f"{at}: a face has a point that does not exist; there are {len(points)}")
-    if not np.all(np.isfinite(points)):
-        raise FormatError(path, f"{at}: points are not finite")
+    if not np.all(np.abs(points) < LARGEST):
+        raise FormatError(path, f"{at}: points are not finite or far too large")
     triangles = triangulate(counts, corners)
     if mesh.GetOrientationAttr().Get() == usd.UsdGeom.Tokens.leftHanded:
         triangles = triangles[:, ::-1]
     joints, weights = _read_influences(rig, query, len(points), at, path)
     geometry = np.array(query.GetGeomBindTransform(), float)
+    if not np.all(np.abs(geometry) < LARGEST):
+        raise FormatError(path, f"{at}: geomBindTransform is not finite or far too large")
     vertices = points @ geometry[:3, :3] + geometry[3, :3]
     if np.linalg.det(geometry[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
@@ -110,8 +113,8 @@ def _read_influences(rig: Rig, query: Any, count: int, at: str, path: Path) -> t
         order = np.arange(len(rig.index)) + rig.added
     if joints.min() < 0 or joints.max() >= len(order):
         raise FormatError(path, f"{at} is bound to joint {joints.max()}; there are {len(order)}")
-    if not np.all(np.isfinite(weights)):
-        raise FormatError(path, f"{at}: weights are not finite")
+    if not np.all(np.abs(weights) < LARGEST):
+        raise FormatError(path, f"{at}: weights are not finite or far too large")
     weights = np.maximum(weights, 0.0)
     total = weights.sum(axis=1, keepdims=True)
     weights[total[:, 0] <= 0, 0] = 1.0  # carried by nobody: by the first

@@ -20,7 +20,7 @@ from sixpoint.body.motion import FileSpace, Motion
 from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.errors import FormatError
-from sixpoint.formats.source import read_bytes
+from sixpoint.formats.source import LARGEST, read_bytes
 from sixpoint.formats.usd.library import import_usd
 from sixpoint.formats.usd.matrices import ALIKE, Similarity, decompose
 from sixpoint.formats.usd.mesh import read_shape
@@ -44,7 +44,15 @@ def read_usd(path: Path) -> tuple[Motion, Shape | None]:
         FormatError: usd-core is missing, the file is no stage, or has no skeleton that can be read.
     """
     usd = import_usd(path)
-    stage = open_stage(usd, path)
+    read_bytes(path)
+    try:
+        return _read(usd, path)
+    except usd.Tf.ErrorException as error:
+        raise FormatError(path, f"not a USD file, or a damaged one: {_said(error)}") from None
+
+
+def _read(usd: Any, path: Path) -> tuple[Motion, Shape | None]:
+    stage = usd.Usd.Stage.Open(str(path))
     rig, binding = read_rig(usd, stage, path)
     space = FileSpace(
         float(usd.UsdGeom.GetStageMetersPerUnit(stage)),
@@ -52,6 +60,8 @@ def read_usd(path: Path) -> tuple[Motion, Shape | None]:
         "file",
         "file",
     )
+    if not 1e-9 <= space.unit <= 1e9:
+        raise FormatError(path, f"metersPerUnit is {space.unit:g}", expected="metres per unit of the stage")
     local, rate = _read_frames(usd, stage, rig, path)
     sizes = _constant_scales(rig, local, path)
     above = _above(rig, sizes)
@@ -59,24 +69,13 @@ def read_usd(path: Path) -> tuple[Motion, Shape | None]:
     return motion, read_shape(usd, rig, binding, path, above * sizes)
 
 
-def open_stage(usd: Any, path: Path) -> Any:
-    """The stage of a file.
-
-    Raises:
-        FormatError: It cannot be read, or is not USD.
-    """
-    read_bytes(path)
+def _said(error: Exception) -> str:
+    """The sentence in an error of usd-core, which comes with the C++ calls that led to it."""
     try:
-        stage = usd.Usd.Stage.Open(str(path))
-    except Exception as error:  # usd-core raises its own kind, with the C++ call chain in it
-        reason = str(error).splitlines()
-        said = [line.strip() for line in reason if "Error" in line or "error" in line]
-        raise FormatError(
-            path, f"not a USD file, or a damaged one: {(said or reason or [''])[-1][:200]}"
-        ) from None
-    if stage is None:
-        raise FormatError(path, "not a USD file, or a damaged one")
-    return stage
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    except UnicodeDecodeError:  # it cites damaged text
+        return "it holds bytes that are no text"
+    return lines[-1].rpartition(" : ")[2].strip("' ")[:200] if lines else "usd-core cannot read it"
 
 
 def _make_motion(rig: Rig, local: Similarity, sizes: Array, rate: float) -> Motion:
@@ -129,8 +128,10 @@ def _sample(usd: Any, rig: Rig, times: list[float], path: Path) -> Similarity:
             translations[frame, joints] = np.asarray(moved[0], float)[rows]
             rotations[frame, joints] = np.asarray(moved[1], float)[rows]
             scales[frame, joints] = np.asarray(moved[2], float)[rows]
-    if not all(np.all(np.isfinite(a)) for a in (rotations, translations, scales)):
-        raise FormatError(path, f"the animation of {rig.path} holds numbers that are not finite")
+    if not all(np.all(np.abs(a) < LARGEST) for a in (rotations, translations, scales)):  # NaN is not
+        raise FormatError(
+            path, f"the animation of {rig.path} holds numbers that are not finite or far too large"
+        )
     _place(usd, rig, times, rotations, translations, scales, path)
     return Similarity(rot.normalised(rotations), translations, scales)
 
