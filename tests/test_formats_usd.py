@@ -328,6 +328,30 @@ def test_uneven_samples_are_read_at_the_frame_rate(tmp_path):
     assert len(formats.load(path)) == 1
 
 
+@pytest.mark.parametrize("what", ["nobody says whose animation it is", "no SkelRoot", "two skeletons"])
+def test_an_animation_is_found_all_the_same(tmp_path, what):
+    """An animation that is not bound, or outside a SkelRoot, and a second skeleton that has one, are found."""
+    path = tmp_path / "other.usda"
+    stage = foreign_stage(path)
+    expected = peer_joints(path, range(1, 6))
+    body, rig = stage.GetPrimAtPath("/World/Body"), stage.GetPrimAtPath("/World/Body/Rig")
+    source = "skel:animationSource"
+    if what == "two skeletons":
+        still = UsdSkel.Skeleton.Define(stage, "/World/ARig")
+        still.CreateJointsAttr(["X"])
+        still.CreateRestTransformsAttr([Gf.Matrix4d(1)])
+        still.CreateBindTransformsAttr([Gf.Matrix4d(1)])
+        stage.GetPrimAtPath("/World").SetChildrenReorder(["ARig", "Body"])
+    elif what == "no SkelRoot":
+        UsdSkel.BindingAPI(rig).CreateAnimationSourceRel().SetTargets(
+            body.GetRelationship(source).GetTargets()
+        )
+        body.SetTypeName("Xform")
+    body.GetRelationship(source).SetTargets([] if what != "two skeletons" else ["/World/Body/Rig/Walk"])
+    stage.GetRootLayer().Save()
+    np.testing.assert_allclose(formats.load(path).positions, expected, atol=1e-5)
+
+
 def test_a_skeleton_without_animation_is_its_rest_pose(tmp_path):
     """One frame, identity rotations but for the root."""
     path = tmp_path / "other.usda"
