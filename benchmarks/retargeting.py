@@ -14,7 +14,8 @@ Absolute mode, residual of standing ankles on the built-in figure, where its leg
 
     python benchmarks/retargeting.py [--data FOLDER]
 
-Without recordings the built-in motions are measured, on the built-in figure and on one of other proportions.
+Without recordings the built-in motions are measured: of the built-in figure, of one of other proportions, and
+of one whose spine is straight in the neutral pose.
 """
 
 from __future__ import annotations
@@ -99,7 +100,15 @@ def clips(data: Path) -> Iterator[tuple[str, str, sp.Motion]]:
     stocky = sp.Figure.from_segments(
         thigh=0.46, calf=0.48, torso_length=0.58, neck=0.14, upper_arm=0.31, forearm=0.31, torso_width=0.5
     )
-    for group, figure in (("samples", sp.Figure.from_stature(TALL)), ("samples, stocky", stocky)):
+    built_in = sp.Figure.from_stature(TALL)
+    offsets = built_in.skeleton.offsets.copy()
+    offsets[list(built_in.roles.spine), 2] = 0.0
+    straight = sp.Figure.from_skeleton(replace(built_in.skeleton, offsets=offsets))
+    for group, figure in (
+        ("samples", built_in),
+        ("samples, stocky", stocky),
+        ("samples, straight spine", straight),
+    ):
         for name in sp.SAMPLES:
             yield group, name, sp.make_sample(name, figure)
 

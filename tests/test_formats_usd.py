@@ -330,7 +330,7 @@ def test_uneven_samples_are_read_at_the_frame_rate(tmp_path):
 
 @pytest.mark.parametrize("what", ["nobody says whose animation it is", "no SkelRoot", "two skeletons"])
 def test_an_animation_is_found_all_the_same(tmp_path, what):
-    """An animation that is not bound, or outside a SkelRoot, and a second skeleton that has one, are found."""
+    """One that is not bound, or outside a SkelRoot, or of the second skeleton, is found."""
     path = tmp_path / "other.usda"
     stage = foreign_stage(path)
     expected = peer_joints(path, range(1, 6))

@@ -113,6 +113,74 @@ def _bones(figure):
     ).T
 
 
+def trunk_rig(spine, clavicles=True, head_is_site=False, root=False):
+    """A figure in T-pose with a spine of these lengths [m] up to the head, which may be an end site."""
+    names, parents, offsets, sites = [], [], [], []
+
+    def add(name, parent, *offset):
+        parents.append(names.index(parent) if parent else -1)
+        names.append(name)
+        offsets.append(offset)
+
+    if root:
+        add("Armature", None, 0, 0, 0)
+    add("Hips", "Armature" if root else None, 0, 1, 0)
+    below, chest = "Hips", "Hips"
+    for k, length in enumerate(spine[: len(spine) - head_is_site]):
+        name = "Head" if k == len(spine) - 1 else f"Spine{k}"
+        add(name, below, 0, length, 0)
+        below = name
+        chest = name if k <= max(0, len(spine) - 3) else chest
+    sites.append((below, 0, spine[-1] if head_is_site else 0.15, 0.01))
+    for side, sign in (("Left", 1), ("Right", -1)):
+        add(f"{side}UpLeg", "Hips", sign * 0.1, -0.08, 0)
+        add(f"{side}Leg", f"{side}UpLeg", 0, -0.42, 0)
+        add(f"{side}Foot", f"{side}Leg", 0, -0.43, 0)
+        if clavicles:
+            add(f"{side}Shoulder", chest, sign * 0.04, 0.2, 0)
+        add(f"{side}Arm", names[-1] if clavicles else chest, sign * 0.15, 0 if clavicles else 0.2, 0)
+        add(f"{side}ForeArm", f"{side}Arm", sign * 0.3, 0, 0)
+        add(f"{side}Hand", f"{side}ForeArm", sign * 0.27, 0, 0)
+        sites += [(f"{side}Foot", 0, -0.07, 0.2), (f"{side}Hand", sign * 0.18, 0, 0)]
+    return sp.Figure.from_skeleton(
+        sp.Skeleton(
+            tuple(names),
+            np.array(parents),
+            np.array(offsets, float),
+            tuple(f"site{k}" for k in range(len(sites))),
+            np.array([names.index(site[0]) for site in sites]),
+            np.array([site[1:] for site in sites], float),
+        )
+    )
+
+
+TRUNKS = {
+    "three joints": trunk_rig((0.2, 0.25, 0.1)),
+    "no clavicles": trunk_rig((0.2, 0.25, 0.1), clavicles=False),
+    "the head a site": trunk_rig((0.2, 0.25, 0.1), head_is_site=True),
+    "one joint": trunk_rig((0.2, 0.3), clavicles=False, head_is_site=True),
+    "eight joints": trunk_rig((0.0, 0.08, 0.08, 0.08, 0.08, 0.1, 0.08, 0.05)),
+    "a root above": trunk_rig((0.2, 0.25, 0.1), root=True),
+}
+
+
+@pytest.mark.parametrize("source", TRUNKS.values(), ids=TRUNKS)
+def test_trunks_of_any_number_of_joints_bend_alike(source):
+    """A bent trunk keeps direction and stretch on straight rigs with other joints; on itself, exactly."""
+    motion = exercise(source, frames=40)
+    points = source.targets(motion).positions
+    np.testing.assert_allclose(retarget(motion, source, source=source).positions, points, atol=1e-9)
+    chord = points[:, 1] - points[:, 0]
+    for target in TRUNKS.values():
+        out = retarget(motion, target, source=source).positions
+        moved = out[:, 1] - out[:, 0]
+        turned = np.degrees(np.arccos(np.clip(np.sum(rot.unit(moved) * rot.unit(chord), axis=1), -1, 1)))
+        assert turned.mean() < 3.0
+        length = np.linalg.norm(target.spine_chain.segments, axis=1).sum()
+        assert np.all(np.linalg.norm(moved, axis=1) < length * (1 + 1e-9))
+        assert np.all(np.linalg.norm(moved, axis=1) > 0.95 * length)
+
+
 @pytest.mark.parametrize("target", [SMALL, STOCKY, OTHER], ids=["small", "stocky", "another rig"])
 def test_standing_feet_stand_on_the_floor(target):
     """Feet that stand still still do, with the soles on the floor, whatever the proportions."""
