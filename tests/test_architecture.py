@@ -45,7 +45,7 @@ ALLOWED = {
 LIBRARIES = {
     "kernels": {"numpy", "numba"},
     "body": {"numpy", "scipy"},
-    "formats": {"numpy", "scipy", "ezc3d"},
+    "formats": {"numpy", "scipy", "ezc3d", "pxr"},
     "samples": {"numpy", "scipy"},
     "signals": {"numpy", "scipy"},
     "calibration": {"numpy", "scipy"},
@@ -98,6 +98,7 @@ def test_rooms_import_only_what_lies_below(path):
             "torch",
             "viser",
             "ezc3d",
+            "pxr",
         }:
             assert parts[0] in LIBRARIES.get(room, set()), name
 

@@ -5,6 +5,7 @@ import pytest
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
+from sixpoint.body.skeleton import FEW
 from sixpoint.errors import SkeletonError, TargetError
 
 NAMES, PARENTS, OFFSETS = ("a", "b", "c"), [-1, 0, 1], np.eye(3)
@@ -103,3 +104,14 @@ def test_walks_over_the_tree():
     assert s.common_ancestor([2, 4]) == 0
     assert [j for j, _ in s.longest_chain(0)] == [0, 3, 4]
     assert list(s.ways_down[0]) == [5.0, 1.0, 0.0, 0.0, 0.0]
+
+
+def test_one_frame_and_many_give_the_same_bits():
+    """Forward kinematics by depth, for few frames, and by joint, for many, do the same sums."""
+    figure = sp.Figure.from_stature()
+    motion = sp.make_sample("walk", figure)
+    assert len(motion) > FEW
+    for frame in (0, 7, len(motion) - 1):
+        positions, world = motion.pose(frame).compute_transforms()
+        np.testing.assert_array_equal(positions, motion.transforms[0][frame])
+        np.testing.assert_array_equal(world, motion.transforms[1][frame])

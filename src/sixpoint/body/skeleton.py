@@ -32,6 +32,9 @@ def frozen(values: object, dtype: type = np.float64) -> NDArray[np.generic]:
     return array
 
 
+FEW = 200  # frames up to which forward kinematics goes by depth rather than by joint
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Skeleton:
     """A tree of joints with rest offsets; joint 0 is the root and ``parents[j] < j``.
@@ -192,16 +195,28 @@ class Skeleton:
         if translations is not None:
             local = local.copy()
             local[..., list(moving), :] = translations
-        positions = np.empty((*lead, len(self), 3))
-        world = np.empty((*lead, len(self), 4))
-        positions[..., 0, :], world[..., 0, :] = local[..., 0, :], rotations[..., 0, :]
-        for joint in range(1, len(self)):
-            parent = self.parents[joint]
-            positions[..., joint, :] = positions[..., parent, :] + rot.mul_vec(
-                world[..., parent, :], local[..., joint, :]
-            )
-            world[..., joint, :] = rot.mul(world[..., parent, :], rotations[..., joint, :])
+        positions, world = np.array(local), rotations.copy()
+        few = world.size < FEW * 4 * len(self)
+        for joints, parents in self._generations if few else self._one_by_one:
+            above = world[..., parents, :]
+            positions[..., joints, :] = positions[..., parents, :] + rot.mul_vec(above, local[..., joints, :])
+            world[..., joints, :] = rot.mul(above, rotations[..., joints, :])
         return positions, world
+
+    @cached_property
+    def _generations(self) -> tuple[tuple[Index, Index], ...]:
+        """Joints of the same depth and their parents, from the root's children on."""
+        depth = np.zeros(len(self), np.int64)
+        for joint in range(1, len(self)):
+            depth[joint] = depth[self.parents[joint]] + 1
+        alike = [np.flatnonzero(depth == level) for level in range(1, int(depth.max()) + 1)]
+        return tuple((joints, self.parents[joints]) for joints in alike)
+
+    @cached_property
+    def _one_by_one(self) -> tuple[tuple[slice, slice], ...]:
+        """Each joint and its parent, as slices: views, where copies of many frames would cost more."""
+        pairs = [(j, int(self.parents[j])) for j in range(1, len(self))]
+        return tuple((slice(j, j + 1), slice(p, p + 1)) for j, p in pairs)
 
     def compute_sites(self, positions: Array, world: Array) -> Array:
         """World positions (..., M, 3) [m] of the sites, from the joints' world transforms."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sixpoint.body.motion import Motion
+from sixpoint.body.shape import Shape
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats.acclaim_write import format_amc, format_asf, plan_bones
@@ -29,6 +30,9 @@ from sixpoint.formats.markers import (
 from sixpoint.formats.npz import format_npz, read_npz
 from sixpoint.formats.space import detect_space, enter_world, leave_world, parse_unit, parse_up
 from sixpoint.formats.tables import format_csv, read_csv
+from sixpoint.formats.usd import USD_SUFFIXES
+from sixpoint.formats.usd.read import read_usd
+from sixpoint.formats.usd.write import format_usd
 
 __all__ = [
     "ANGLE_SUFFIXES",
@@ -38,6 +42,7 @@ __all__ = [
     "holds_markers",
     "load",
     "load_markers",
+    "load_shape",
     "load_targets",
     "save",
     "save_angles",
@@ -45,10 +50,12 @@ __all__ = [
     "save_targets",
 ]
 
-MOTION_SUFFIXES = (".bvh", ".amc", ".asf")
+MOTION_SUFFIXES = (".bvh", ".amc", ".asf", *USD_SUFFIXES)
+OUTPUT_SUFFIXES = (".bvh", ".amc", *USD_SUFFIXES)
+"""What a motion is written as."""
 TARGET_SUFFIXES = (".csv", ".npz")
 
-_NOT_YET = (".glb", ".gltf", ".vrm", ".usd", ".usda", ".usdc")
+_NOT_YET = (".glb", ".gltf", ".vrm")
 _FBX = (
     "FBX files are not read; convert it, e.g. in Blender: File > Import > FBX, then "
     "File > Export > Motion Capture (.bvh)"
@@ -63,14 +70,17 @@ def load(
     up: str | None = None,
     rate: float | None = None,
 ) -> Motion:
-    """Read a motion from a .bvh, .amc or .asf file (an ASF alone is one frame of its rest pose).
+    """Read a motion from a .bvh, .amc, .asf or .usd, .usda, .usdc file.
+
+    An ASF alone is one frame of its rest pose. Of a USD stage the first animated skeleton is read.
 
     Args:
         path: The file.
         skeleton: The .asf of an .amc file; by default it is looked for beside it.
-        unit: Metres per file unit, or one of m, cm, mm, inch, cmu. By default the ASF's; guessed from
+        unit: Metres per file unit, or one of m, cm, mm, inch, cmu. By default the file's; guessed from
             the size of the body for BVH, which states none.
-        up: Up axis of the file, "y" or "z"; by default guessed from the posture for BVH, Y for AMC.
+        up: Up axis of the file, "y" or "z"; by default guessed from the posture for BVH, Y for AMC, and the
+            file's for USD.
         rate: Frames per second [Hz] in place of the file's. AMC states none: 120 by default.
 
     Returns:
@@ -89,7 +99,11 @@ def load(
             raw = read_bvh(path)
             motion = enter_world(raw, detect_space(path, raw, unit, up))
             return motion if rate is None else replace(motion, rate=rate)
-        raw = read_acclaim(path, skeleton, rate)
+        if suffix in USD_SUFFIXES:
+            raw, _ = read_usd(path)
+            raw = raw if rate is None else replace(raw, rate=rate)
+        else:
+            raw = read_acclaim(path, skeleton, rate)
         space = raw.space
         if unit is not None:
             space = replace(space, unit=parse_unit(path, unit), unit_source="given")
@@ -100,6 +114,27 @@ def load(
         raise _with_path(path, error) from error
 
 
+def load_shape(path: str | Path) -> Shape | None:
+    """Read the surface that is skinned to the rig of a .usd, .usda or .usdc file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        All its skinned meshes as one shape [m], on the joints that ``load`` gives; None where there is none.
+
+    Raises:
+        FormatError: The file cannot be read.
+    """
+    path = Path(path)
+    _check_suffix(path, USD_SUFFIXES, "surfaces")
+    motion, shape = read_usd(path)
+    unit = motion.space.unit
+    if shape is None or unit == 1.0:
+        return shape
+    return replace(shape, vertices=shape.vertices * unit, bind_positions=shape.bind_positions * unit)
+
+
 def save(
     motion: Motion,
     path: str | Path,
@@ -108,22 +143,33 @@ def save(
     unit: str | float | None = None,
     up: str | None = None,
     order: str | None = None,
+    shape: Shape | None = None,
 ) -> None:
-    """Write a motion as .bvh, or as .amc with its .asf beside it.
+    """Write a motion as .bvh, as .amc with its .asf beside it, or as .usd, .usda or .usdc.
 
     Args:
         motion: In metres, Y up.
         path: The file.
         force: Overwrite existing files.
-        unit: Metres per file unit, or one of m, cm, mm, inch, cmu; by default ``motion.space.unit``.
-        up: Up axis of the file; by default ``motion.space.up``. AMC is always written Y up.
+        unit: Metres per file unit, or one of m, cm, mm, inch, cmu; by default ``motion.space.unit``. USD is
+            always written in metres, which it says.
+        up: Up axis of the file; by default ``motion.space.up``. AMC and USD are always written Y up.
         order: Euler order of a BVH, e.g. "ZYX"; by default ``motion.space.order``, the source's.
+        shape: A surface bound to the motion's joints, for USD.
 
     Raises:
         FormatError: Nothing was written; the message says why.
     """
     path = Path(path)
-    suffix = _check_suffix(path, (".bvh", ".amc"), "motions, writing")
+    suffix = _check_suffix(path, OUTPUT_SUFFIXES, "motions, writing")
+    if suffix in USD_SUFFIXES:
+        if unit is not None or up is not None or order is not None:
+            raise FormatError(path, "USD is written in metres, Y up, with quaternions: no unit, up or order")
+        check_writable([path], force)
+        write_files({path: format_usd(motion, path, shape)}, force)
+        return
+    if shape is not None:
+        raise FormatError(path, f"a {suffix} file holds no surface; formats that do: {listed(USD_SUFFIXES)}")
     space = motion.space
     if unit is not None:
         space = replace(space, unit=parse_unit(path, unit))

@@ -14,19 +14,22 @@ from sixpoint.errors import FormatError
 from sixpoint.formats import (
     ANGLE_SUFFIXES,
     MARKER_OUTPUTS,
+    OUTPUT_SUFFIXES,
     TARGET_SUFFIXES,
     holds_markers,
+    load_shape,
     save,
     save_angles,
     save_markers,
     save_targets,
 )
+from sixpoint.formats.usd import USD_SUFFIXES
 from sixpoint.jobs.reading import Reading, is_targets, open_markers, open_motion, open_targets
 from sixpoint.jobs.writing import check_output, keep_sources
 from sixpoint.signals.gaps import fill_gaps
 from sixpoint.signals.low_pass import low_pass
 
-OUTPUTS = (".bvh", ".amc", ".mot", *TARGET_SUFFIXES)
+OUTPUTS = (*OUTPUT_SUFFIXES, ".mot", *TARGET_SUFFIXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,9 @@ def convert(
         opened = open_motion(source, reading)
         keep_sources(files, [source, opened.skeleton])
         content = opened.motion
-        save(content, out, force=force, unit=out_unit, up=out_up)
+        surfaces = {source.suffix.lower(), out.suffix.lower()} <= set(USD_SUFFIXES)
+        shape = load_shape(source) if surfaces else None
+        save(content, out, force=force, unit=out_unit, up=out_up, shape=shape)
     return Conversion(content, files)
 
 

@@ -12,15 +12,14 @@ from pathlib import Path
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, SixpointError
-from sixpoint.formats import MOTION_SUFFIXES, save
+from sixpoint.errors import FormatError, SixpointError, listed
+from sixpoint.formats import MOTION_SUFFIXES, OUTPUT_SUFFIXES, save
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.jobs.writing import check_output, keep_sources
 from sixpoint.study.metrics import Errors, compute_errors
 
-OUTPUTS = (".bvh", ".amc")
 STATURE = 1.75
 """Stature of the built-in figure where none is given [m]."""
 
@@ -77,7 +76,8 @@ def reconstruct(
 
     Args:
         source: A motion or targets.
-        out: A .bvh, or an .amc with its .asf beside it; by default ``<stem>_<method>.bvh`` here.
+        out: A .bvh, .usd, .usda, .usdc, or an .amc with its .asf beside it; by default
+            ``<stem>_<method>.bvh`` here.
         reading: How to read the source.
         solving: Method and options.
         body: Whom to pose; for a motion only the mapping counts, the rig is its own.
@@ -94,7 +94,7 @@ def reconstruct(
     out = out or Path(f"{source.stem}_{solving.method}.bvh")
     points_only = is_targets(source)
     _check_request(points_only, body, extras, picture)
-    files = check_output(out, OUTPUTS, force, "for the six points: sixpoint convert")
+    files = check_output(out, OUTPUT_SUFFIXES, force, "for the six points: sixpoint convert")
     files += check_output(picture, (".png",), force) if picture else []
     if points_only:
         figure, opened, targets = _prepare_targets(source, reading, solving, body)
@@ -161,7 +161,7 @@ def _prepare_targets(
             raise SixpointError("--mapping names joints of a rig: give the rig with --skeleton")
         return Figure.from_stature(STATURE if body.stature is None else body.stature, limits), None, targets
     if body.rig.suffix.lower() not in MOTION_SUFFIXES:
-        raise FormatError(body.rig, "the rig of targets is a .bvh, .asf or .amc file")
+        raise FormatError(body.rig, f"the rig of targets is a motion file: {listed(MOTION_SUFFIXES)}")
     opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))
     return Figure.from_motion(opened.whole, body.mapping, limits), opened, targets
 
