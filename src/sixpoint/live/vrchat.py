@@ -25,7 +25,7 @@ from sixpoint.live.osc_write import encode, join_bundles
 from sixpoint.live.readings import NO_ROTATION, Kind, Packet, Quaternion, Reading, as_position
 from sixpoint.live.unity import from_unity_euler, mirror_position, to_unity_euler
 from sixpoint.live.vmc import numbers_of
-from sixpoint.live.vmc_bones import find_bones
+from sixpoint.body.human_bones import find_bones
 from sixpoint.live.vmc_write import MAX_BUNDLE
 
 PREFIX = "/tracking/trackers/"
