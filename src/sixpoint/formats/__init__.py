@@ -20,8 +20,7 @@ from sixpoint.formats.amc import find_skeleton, read_acclaim
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.bvh import read_bvh
 from sixpoint.formats.bvh_write import format_bvh
-from sixpoint.formats.gltf.avatar import SUFFIXES as GLTF_SUFFIXES
-from sixpoint.formats.gltf.avatar import Avatar, load_avatar, read_gltf_motion
+from sixpoint.formats.gltf.avatar import GLTF_SUFFIXES, Avatar, load_avatar, read_gltf_motion
 from sixpoint.formats.gltf.vrma import format_vrma
 from sixpoint.formats.gltf.write_avatar import format_avatar
 from sixpoint.formats.gltf.write_figure import format_figure
@@ -29,7 +28,16 @@ from sixpoint.formats.npz import format_npz, read_npz
 from sixpoint.formats.space import detect_space, enter_world, leave_world, parse_unit, parse_up
 from sixpoint.formats.tables import format_csv, read_csv
 
-__all__ = ["Avatar", "find_skeleton", "load", "load_avatar", "load_targets", "save", "save_targets"]
+__all__ = [
+    "GLTF_SUFFIXES",
+    "Avatar",
+    "find_skeleton",
+    "load",
+    "load_avatar",
+    "load_targets",
+    "save",
+    "save_targets",
+]
 
 MOTION_SUFFIXES = (".bvh", ".amc", ".asf", *GLTF_SUFFIXES)
 SAVED_SUFFIXES = (".bvh", ".amc", ".glb", ".vrma")

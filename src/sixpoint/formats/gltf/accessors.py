@@ -33,7 +33,7 @@ def read_floats(document: Document, index: int, kind: str, what: str) -> Array:
     raw = _read(document, index, kind, what)
     values = raw.astype(np.float64)
     if document.items("accessors")[index].get("normalized") and raw.dtype.kind in "iu":
-        values /= np.iinfo(raw.dtype).max
+        values /= 2 ** (8 * raw.dtype.itemsize - (raw.dtype.kind == "i")) - 1
         if raw.dtype.kind == "i":
             np.maximum(values, -1.0, out=values)
     if not np.isfinite(values).all():

@@ -1,7 +1,7 @@
 """The movement in a glTF file: an animation sampled at a constant rate.
 
-The rate is that of the keys where they lie on an even grid (what motion capture and most exporters write), else
-60 Hz. LINEAR, STEP and CUBICSPLINE keys are evaluated as the specification says.
+The rate is that of the keys where they lie on an even grid (what motion capture and most exporters write),
+else 60 Hz. LINEAR, STEP and CUBICSPLINE keys are evaluated as the specification says.
 
 Reference: Khronos, glTF 2.0 specification, section 3.11 and appendix C (interpolation).
 """
@@ -166,7 +166,7 @@ def _even_rate(keys: Array) -> float | None:
 
 
 def warn_of_scales(document: Document, channels: list[Channel], scales: Array) -> None:
-    """Say it where an animation changes the scale of a node: a Motion cannot hold that."""
+    """Say it where an animation changes the scale of a joint: a Motion cannot hold that."""
     moving = {
         c.node
         for c in channels
@@ -178,6 +178,6 @@ def warn_of_scales(document: Document, channels: list[Channel], scales: Array) -
     if moving:
         first = document.label("nodes", min(moving))
         warnings.warn(
-            f"{document.path}: the animation scales {len(moving)} nodes, such as {first}; scales stay as they rest",
+            f"{document.path}: the animation scales {len(moving)} nodes, such as {first}: left out",
             stacklevel=5,
         )

@@ -1,7 +1,8 @@
 """Materials and textures baked to one colour per vertex.
 
-Base colour factor times base colour texture (bilinear, at the vertex) times vertex colour; what needs light or
-a view (metal, normal maps, toon shading) is left out. An image that cannot be decoded is said and counts as white.
+Base colour factor times base colour texture (bilinear, at the vertex) times vertex colour; what needs light
+or a view (metal, normal maps, toon shading) is left out. An image that cannot be decoded is said and counts
+as white.
 
 Reference: Khronos, glTF 2.0 specification, section 3.9 (materials), 3.8 (textures); KHR_texture_transform.
 """

@@ -1,11 +1,12 @@
 """An avatar: a glTF or VRM file as a Figure with its Shape, and the way back into the file.
 
-The reference pose, in which all frames are aligned with the world, is the T-pose of the nodes where a humanoid
-map says that they stand so, else the pose in which the mesh was bound, else that of the nodes.
+The reference pose, in which all frames are aligned with the world, is the T-pose of the nodes where a
+humanoid map says that they stand so, else the pose in which the mesh was bound, else that of the nodes.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,12 +29,12 @@ from sixpoint.formats.gltf.binding import check_one_body, find_bind_pose, place_
 from sixpoint.formats.gltf.document import Document, read_document
 from sixpoint.formats.gltf.humanoid import BONE_ROLES, Humanoid, find_humanoid
 from sixpoint.formats.gltf.mesh import Piece, join_pieces, read_pieces
-from sixpoint.formats.gltf.nodes import NodeTree, read_nodes
+from sixpoint.formats.gltf.nodes import read_nodes
 from sixpoint.formats.gltf.rig import HALF_TURN, Rig, build_rig, choose_joints
 
 Array = NDArray[np.float64]
 
-SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
+GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
 STILL = 1e-5
 """Part of the body's size within which a joint keeps its offset."""
 SPACE = FileSpace(1.0, "y", "convention", "convention")
@@ -72,7 +73,7 @@ class Avatar:
 
     @property
     def kind(self) -> str:
-        """ "glTF", "VRM 0.x", "VRM 1.0" or "VRM animation"."""
+        """The kind of file: "glTF", "VRM 0.x", "VRM 1.0" or "VRM animation"."""
         return "glTF" if self.humanoid is None else self.humanoid.kind
 
     @cached_property
@@ -111,15 +112,15 @@ def load_avatar(
         limits: Joint limits; the shipped table by default.
 
     Raises:
-        FormatError: The file cannot be read, is not supported, or its body is not found; the message says why.
+        FormatError: The file cannot be read or is not supported, or its body is not found.
     """
     path = Path(path)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # damaged files hold any numbers; what matters is checked
         try:
-            tree, humanoid, rigs = _open(path)
-            rig, figure = _find_figure(tree, humanoid, rigs, mapping, limits)
-            skins = read_skins(tree)
-            bound = place_bind_pose(rig, find_bind_pose(tree, skins))
+            rig, humanoid = _open(path)
+            figure = _find_figure(rig, humanoid, read_mapping(mapping), limits)
+            skins = read_skins(rig.tree)
+            bound = place_bind_pose(rig, find_bind_pose(rig.tree, skins))
             pieces = read_pieces(rig, skins, *bound)
             shape: Shape | None = join_pieces(rig, pieces, *bound, path.stem)
         except FormatError:
@@ -137,20 +138,16 @@ def read_gltf_motion(path: Path, rate: float | None = None) -> Motion:
     """
     with np.errstate(all="ignore"):
         try:
-            tree, humanoid, rigs = _open(path)
-            try:
-                rig = _find_figure(tree, humanoid, rigs, None, None)[0]
-            except FigureError:
-                rig = rigs[0]
-            return sample_motion(rig, _first_channels(tree.document), rate)
+            rig, _ = _open(path)
+            return sample_motion(rig, _first_channels(rig.tree.document), rate)
         except FormatError:
             raise
         except SixpointError as error:
             raise FormatError(path, str(error)) from error
 
 
-def _open(path: Path) -> tuple[NodeTree, Humanoid | None, list[Rig]]:
-    """The nodes, the humanoid map, and rigs in the reference poses that come into question, best first."""
+def _open(path: Path) -> tuple[Rig, Humanoid | None]:
+    """The rig in the reference pose that shows a human, and the humanoid map."""
     tree = read_nodes(read_document(path))
     humanoid = find_humanoid(tree.document, tree)
     skins = read_skins(tree)
@@ -160,43 +157,35 @@ def _open(path: Path) -> tuple[NodeTree, Humanoid | None, list[Rig]]:
     bones = [] if humanoid is None else humanoid.bones.values()
     animated = {c.node for c in _first_channels(tree.document)}
     joints = choose_joints(tree, {n for s in skins for n in s.nodes}, bones, animated)
-    standing = build_rig(tree, joints, turn)
+    rigs = [build_rig(tree, joints, turn)]
     bound = {n: rot.mul(turn, q) for n, q in find_bind_pose(tree, skins).rotations.items()}
-    if not bound:
-        return tree, humanoid, [standing]
-    rigs = [build_rig(tree, joints, turn, bound), standing]
-    return tree, humanoid, rigs if humanoid is None else rigs[::-1]
+    if bound:
+        rigs.insert(0 if humanoid is None else 1, build_rig(tree, joints, turn, bound))
+    for rig in rigs:
+        with contextlib.suppress(FigureError):
+            _find_figure(rig, humanoid, {}, None)
+            return rig, humanoid
+    return rigs[0], humanoid
 
 
 def _find_figure(
-    tree: NodeTree,
-    humanoid: Humanoid | None,
-    rigs: list[Rig],
-    mapping: Mapping[str, str] | str | Path | None,
-    limits: Limits | None,
-) -> tuple[Rig, Figure]:
-    """The first rig whose rest pose shows a human; else one whose movement does."""
-    given = read_mapping(mapping)
-    problem: FigureError | None = None
-    channels = _first_channels(tree.document)
-    tries = [(rig, False) for rig in rigs] + [(rig, True) for rig in rigs if channels]
-    for rig, moving in tries:
-        roles = {}
-        if humanoid is not None:
-            joint = {node: name for node, name in zip(rig.nodes, rig.skeleton.names, strict=True)}
-            roles = {role: joint[humanoid.bones[b]] for b, role in BONE_ROLES.items() if b in humanoid.bones}
-        try:
-            if moving:
-                motion = sample_motion(rig, channels, None)
-                figure = Figure.from_motion(motion, roles | given, limits)
-            else:
-                figure = Figure.from_skeleton(rig.skeleton, roles | given, limits)
-        except FigureError as error:
-            problem = problem or error
-        else:
-            return rig, replace(figure, name=tree.document.path.stem)
-    assert problem is not None
-    raise problem
+    rig: Rig, humanoid: Humanoid | None, mapping: Mapping[str, str], limits: Limits | None
+) -> Figure:
+    """The anatomy of a rig: in its rest pose, else in its movement."""
+    roles = {}
+    if humanoid is not None:
+        joint = dict(zip(rig.nodes, rig.skeleton.names, strict=True))
+        roles = {role: joint[humanoid.bones[b]] for b, role in BONE_ROLES.items() if b in humanoid.bones}
+    roles |= mapping
+    document = rig.tree.document
+    try:
+        figure = Figure.from_skeleton(rig.skeleton, roles, limits)
+    except FigureError:
+        channels = _first_channels(document)
+        if not channels:
+            raise
+        figure = Figure.from_motion(sample_motion(rig, channels, None), roles, limits)
+    return replace(figure, name=document.path.stem)
 
 
 def _first_channels(document: Document) -> list[Channel]:

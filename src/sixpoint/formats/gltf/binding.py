@@ -1,8 +1,8 @@
 """Skins: how a mesh hangs on its joints, and the pose in which it was bound.
 
 A skin's inverse bind matrix takes a vertex into the frame of a joint, x = L v + m in metres. From it follows
-where the joint was when the mesh was bound, but only up to a placement of the whole mesh; that is taken from the
-mesh's node, from the file's world or from the top joint, whichever comes nearest to the pose of the nodes.
+where the joint was when the mesh was bound, but only up to a placement of the whole mesh; that is taken from
+the mesh's node, from the file's world or from the top joint, whichever comes nearest to the pose of the nodes.
 
 Reference: Khronos, glTF 2.0 specification, section 3.7.3 (skins).
 """
@@ -122,7 +122,7 @@ def check_one_body(tree: NodeTree, skins: list[Skin]) -> None:
     if len(groups) > 1:
         labels = [tree.document.label("skins", members[0]) for _, members in groups]
         raise tree.document.error(
-            f"the skins are of {len(groups)} separate skeletons ({', '.join(labels)}): export one body per file"
+            f"the skins are of {len(groups)} separate skeletons: {', '.join(labels)}; export one body per file"
         )
 
 
@@ -169,7 +169,7 @@ def place_bind_pose(rig: Rig, pose: BindPose) -> tuple[Array, Array]:
 
 
 def _placements(tree: NodeTree, skin: Skin, positions: Array, rotations: Array) -> list[tuple[Array, Array]]:
-    """Placements (origin (3,), rotation (4,)) of the bound mesh in the file's world that come into question."""
+    """Placements (origin (3,), rotation (4,)) of the bound mesh in the file's world to choose from."""
     top = min(range(len(skin.nodes)), key=lambda k: len(tree.path(skin.nodes[k])))
     turn = rot.mul(_world_rotation(tree, skin.nodes[top]), rot.inv(rotations[top]))
     found = [(tree.world[skin.nodes[top], :3, 3] - rot.mul_vec(turn, positions[top]), turn)]

@@ -144,7 +144,7 @@ def _read_triangles(
         order = read_indices(document, primitive["indices"], "SCALAR", what)[:, 0]
         if order.max() >= len(points):
             raise document.error(
-                f"accessors[{primitive['indices']}] ({what}) names vertex {order.max()}, there are {len(points)}"
+                f"accessors[{primitive['indices']}] ({what}) names vertex {order.max()} of {len(points)}"
             )
     else:
         order = np.arange(len(points))
@@ -198,7 +198,7 @@ def _read_weights(
 def _bind(
     points: Array, skin: Skin, local: Index, weights: Array, positions: Array, rotations: Array
 ) -> Array:
-    """Skinned vertices (n, 3) in a common pose: positions (n, K, 3) and rotations (n, K, 4) of their joints."""
+    """Skinned vertices (n, 3) in a pose: positions (n, K, 3) and rotations (n, K, 4) of their joints."""
     bound = np.zeros_like(points)
     for k in range(local.shape[1]):
         inside = np.einsum("nij,nj->ni", skin.linear[local[:, k]], points) + skin.shift[local[:, k]]

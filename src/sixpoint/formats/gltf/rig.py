@@ -6,8 +6,8 @@ in a reference pose (the bind pose or that of the nodes) and s the scale it has 
     sixpoint's local rotation = W_parent * node's local rotation * inv(W)
     sixpoint's offset = W_parent (s_parent * node's translation)
 
-so that in the reference pose all joints' frames are aligned with the world, in metres. Avatars that look along
--Z (VRM 0.x) are turned to look along +Z.
+so that in the reference pose all joints' frames are aligned with the world, in metres. Avatars that look
+along -Z (VRM 0.x) are turned to look along +Z.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def build_rig(
             continue
         names.append(tree.names[node])
         if k:
-            parents[k] = row[tree.parents[node]] if tree.parents[node] in row else 0
+            parents[k] = row.get(tree.parents[node], 0)
         up, scale = (frames[parents[k]], scales[parents[k]]) if k else (above, above_scale)
         offsets[k] = rot.mul_vec(up, scale * tree.translations[node]) + (0.0 if k else above_origin)
         frames[k] = bound.get(node, rot.mul(up, tree.rotations[node]))

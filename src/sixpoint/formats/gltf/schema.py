@@ -131,7 +131,7 @@ def record(required: Mapping[str, Rule] | None = None, **optional: Rule) -> Rule
 _TEXTURE = record({"index": index("textures")}, texCoord=whole(0, 100), extensions=table(record()))
 _BONE0 = record(bone=text, node=whole(-1))
 _BONES1 = record({"humanBones": table(record({"node": index("nodes")}))})
-_VRM = {
+_VRM: dict[str, Rule] = {
     "VRM": record(humanoid=record(humanBones=many(_BONE0)), meta=record(), specVersion=text),
     "VRMC_vrm": record(humanoid=_BONES1, meta=record(name=text), specVersion=text),
     "VRMC_vrm_animation": record(humanoid=_BONES1, specVersion=text),
@@ -213,7 +213,7 @@ _DOCUMENT = record(
     ),
     textures=many(record(source=index("images"), sampler=index("samplers"), extensions=table(record()))),
     scene=index("scenes"),
-    extensions=record(**_VRM),
+    extensions=record(None, **_VRM),
     extensionsUsed=many(text),
     extensionsRequired=many(text),
 )

@@ -1,6 +1,7 @@
 """An avatar's own file with another animation: materials, textures, meshes and extensions stay as they are.
 
-The file's old animations go, with the numbers that only they used; external images and buffers come into the GLB.
+The file's old animations go, with the numbers that only they used; external images and buffers come into the
+GLB.
 """
 
 from __future__ import annotations
@@ -110,9 +111,9 @@ def _copy(document: Document) -> Builder:
         owner[key] = renumbered[owner[key]]
     for index, image in enumerate(content.get("images", [])):
         if "uri" in image:
-            data, kind = read_image(document, index)
+            picture, kind = read_image(document, index)
             image.pop("uri")
-            image |= {"bufferView": builder.add_view(data), "mimeType": kind}
+            image |= {"bufferView": builder.add_view(picture), "mimeType": kind}
     return builder
 
 

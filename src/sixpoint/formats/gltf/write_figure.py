@@ -119,7 +119,7 @@ def _free_name(name: str, skeleton: Skeleton) -> str:
 
 
 def _carriers(shape: Shape) -> tuple[Index, Array]:
-    """Joints and weights (V, 4 or 8): none twice, the heaviest first, weights in single precision sum to one."""
+    """Joints and weights (V, 4 or 8): none twice, the heaviest first, in single precision sums of one."""
     count, width = shape.joints.shape
     joints, weights = shape.joints.copy(), shape.weights.copy()
     for a in range(width):  # a joint that is named twice carries both weights once
