@@ -12,7 +12,7 @@ from pathlib import Path
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, SixpointError
+from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES, save
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
@@ -147,7 +147,7 @@ def _prepare_motion(
 ) -> tuple[Figure, Opened | None, Targets]:
     limits = solving.load_limits()
     opened = open_motion(source, replace(reading, skeleton=body.rig))
-    figure = Figure.from_motion(opened.whole, body.mapping, limits)
+    figure = opened.find_figure(body.mapping, limits)
     return figure, opened, figure.targets(opened.motion)
 
 
@@ -161,9 +161,9 @@ def _prepare_targets(
             raise SixpointError("--mapping names joints of a rig: give the rig with --skeleton")
         return Figure.from_stature(STATURE if body.stature is None else body.stature, limits), None, targets
     if body.rig.suffix.lower() not in MOTION_SUFFIXES:
-        raise FormatError(body.rig, "the rig of targets is a .bvh, .asf or .amc file")
+        raise FormatError(body.rig, f"the rig of targets is one of {listed(MOTION_SUFFIXES)}")
     opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))
-    return Figure.from_motion(opened.whole, body.mapping, limits), opened, targets
+    return opened.find_figure(body.mapping, limits), opened, targets
 
 
 def _draw(figure: Figure, truth: Motion, result: Motion, picture: Path, method: str) -> None:
