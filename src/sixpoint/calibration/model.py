@@ -77,7 +77,7 @@ class Body:
     @property
     def legs(self) -> Array:
         """(2,) lengths of the stretched legs, hip to ankle [m]."""
-        return np.array([_length(self.figure, limb) for limb in self.figure.roles.limbs[2:]])
+        return self.figure.limb_lengths[2:]
 
     def rests(self, mounts: Array) -> dict[int, Rest]:
         """How still head, wrists and ankles are held, by effector; the neck turns with the head.
@@ -105,9 +105,3 @@ def stature_of(figure: Figure) -> float:
 @cache
 def _mean_height() -> float:
     return Figure.from_stature(MEAN_STATURE).height
-
-
-def _length(figure: Figure, limb: tuple[int, int, int]) -> float:
-    root, middle, end = limb
-    upper, lower = figure.offset_between(root, middle), figure.offset_between(middle, end)
-    return float(np.linalg.norm(upper) + np.linalg.norm(lower))
