@@ -12,7 +12,7 @@ from sixpoint.cli.screen import Screen
 
 
 def render(
-    file: Annotated[Path, Parameter(help="A motion (.bvh, .amc).")],
+    file: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .glb, .vrma ..).")],
     /,
     *,
     out: Annotated[
@@ -22,6 +22,10 @@ def render(
             help="An .mp4 is a film, a .png a contact sheet, and what has no suffix a folder of frames; by "
             "default `<name>.mp4` in this folder.",
         ),
+    ] = None,
+    avatar: Annotated[
+        Path | None,
+        Parameter(help="An avatar (.glb, .gltf, .vrm) to draw, whatever the motion's own body is."),
     ] = None,
     over: Annotated[
         Path | None,
@@ -39,7 +43,8 @@ def render(
     colours: Annotated[
         str | None,
         Parameter(
-            help="`sides` (left and right apart), `clay`, or a colour such as `#c8b090`; by default sides."
+            help="`sides` (left and right apart), `clay`, or a colour such as `#c8b090`; by default sides, "
+            "of an avatar its own."
         ),
     ] = None,
     fps: Annotated[float, Parameter(help="Pictures per second of a film or a folder.")] = 30.0,
@@ -55,8 +60,8 @@ def render(
 ) -> None:
     """Draw a motion: a film, a contact sheet, or a folder of pictures.
 
-    The body of its rig is made from its proportions. Neither a display nor a graphics card is needed. Needs
-    Embree, PyAV and Pillow: `pip install "sixpoint[render]"`.
+    The body of its rig is made from its proportions; an avatar's is its own. Neither a display nor a graphics
+    card is needed, but Embree, PyAV and Pillow are: `pip install "sixpoint[render]"`.
 
     For example:
 
@@ -66,6 +71,7 @@ def render(
     sixpoint render walk.bvh -o walk.png --pictures 12 --view side
     sixpoint render walk.bvh -o still.png --frames 120 --size 800x900
     sixpoint render walk.bvh -o frames --fps 10
+    sixpoint render walk.bvh --avatar robot.glb -o robot.mp4
     ```
     """
     from sixpoint.cli import describe
@@ -82,6 +88,7 @@ def render(
             out or Path(f"{file.stem}.mp4"),
             reading=Reading(skeleton, unit, up, rate, chosen),
             look=look,
+            avatar=avatar,
             over=over,
             mapping=mapping,
             force=force,

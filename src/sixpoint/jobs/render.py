@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,9 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.flesh import build_shape
 from sixpoint.body.motion import Motion
 from sixpoint.errors import FormatError, SixpointError
+from sixpoint.formats import load_avatar
 from sixpoint.formats.atomic import write_files
+from sixpoint.jobs.driving import drive, is_on, open_avatar
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Reading, is_targets, open_motion
 from sixpoint.jobs.writing import check_output, keep_sources, prepare_folder
@@ -103,6 +105,7 @@ def render(
     *,
     reading: Reading | None = None,
     look: Look | None = None,
+    avatar: Path | None = None,
     over: Path | None = None,
     mapping: Path | None = None,
     force: bool = False,
@@ -111,10 +114,12 @@ def render(
     """Draw a motion.
 
     Args:
-        source: The motion; its rig gets the built-in surface.
+        source: The motion; its rig gets the built-in surface, that of an avatar's file its own.
         out: An .mp4 is a film, a .png a contact sheet; what has no suffix is a folder of frames.
         reading: How to read the source.
         look: How pictures look.
+        avatar: A .glb, .gltf or .vrm that is drawn instead. A motion on another skeleton is carried over to
+            its proportions and posed anew from its six points.
         over: A second motion, drawn behind the first as a ghost: the truth of a result. It is read with the
             frames of the first.
         mapping: A TOML table role -> joint name, for an unusual rig.
@@ -128,11 +133,11 @@ def render(
     check_libraries()
     look.check()
     _check_place(out, look, force)
-    sources = [source, reading.skeleton, over, mapping]
-    keep_sources([out], sources)
-    actors = [_open_actor(source, reading, mapping, look.colours or "sides")]
+    keep_sources([out], [source, reading.skeleton, avatar, over, mapping])
+    actors = [_open_actor(source, reading, mapping, look.colours, avatar, progress)]
     if over is not None:
-        actors.append(_open_actor(over, Reading(frames=reading.frames), None, "ghost", ghost=True))
+        ghost = _open_actor(over, Reading(frames=reading.frames), None, "ghost", avatar, progress)
+        actors.append(replace(ghost, ghost=True))
     return draw(actors, out, look, force=force, progress=progress)
 
 
@@ -165,14 +170,35 @@ def draw(
 
 
 def _open_actor(
-    source: Path, reading: Reading, mapping: Path | None, colours: str, ghost: bool = False
+    source: Path,
+    reading: Reading,
+    mapping: Path | None,
+    colours: str | None,
+    avatar: Path | None,
+    progress: Progress,
 ) -> Actor:
     if is_targets(source):
         raise FormatError(source, "six points hold no body; pose one with: sixpoint reconstruct")
     opened = open_motion(source, reading)
-    figure = Figure.from_motion(opened.whole, mapping)
-    shape = build_shape(figure)
-    return Actor(figure, opened.motion, Surface(shape, paint(figure, shape, colours)), ghost)
+    motion = opened.motion
+    looks = None
+    if avatar is not None:
+        looks = open_avatar(avatar)
+        figure = looks.figure
+        if figure.shape is None:
+            raise FormatError(avatar, "this avatar has bones only, and no mesh that could be drawn")
+        if not is_on(motion, figure):
+            owner = opened.find_figure(mapping)
+            motion = drive(figure, motion, owner, progress=progress)[1].solution.motion
+    elif opened.avatar is not None:
+        looks = load_avatar(opened.avatar, mapping)
+        figure = looks.figure
+    else:
+        figure = opened.find_figure(mapping)
+    shape = figure.shape or build_shape(figure)
+    own = looks.appearance if looks is not None and figure.shape is not None else None
+    painted = own.colours if own is not None and colours is None else paint(figure, shape, colours or "sides")
+    return Actor(figure, motion, Surface(shape, painted))
 
 
 def _choose_frames(motion: Motion, look: Look, sheet: bool) -> NDArray[np.int64]:
