@@ -46,7 +46,7 @@ ALLOWED = {
 LIBRARIES = {
     "kernels": {"numpy", "numba"},
     "body": {"numpy", "scipy"},
-    "formats": {"numpy", "scipy"},
+    "formats": {"numpy", "scipy", "PIL"},
     "samples": {"numpy", "scipy"},
     "signals": {"numpy", "scipy"},
     "calibration": {"numpy", "scipy"},

@@ -47,7 +47,8 @@ def build_shape(figure: Figure) -> Shape:
     watertight: ``trunk``, ``head``, and with ``l_`` and ``r_``: ``arm``, ``hand``, ``leg``, ``foot``. Parts
     overlap where they meet. A vertex hangs on at most four joints.
 
-    Reference: sections after Drillis & Contini 1966 and Gordon et al. 2014 (ANSUR II); ``data/flesh.toml``.
+    Reference: lengths of head, hands and feet after Drillis & Contini 1966; for the sections see
+    ``data/flesh.toml``.
     """
     positions, world = figure.neutral_pose.compute_transforms()
     flesh = Flesh(figure, positions, figure.height * _stature_per_height())
@@ -81,7 +82,9 @@ def _add_limb(
     centres = _along(points, places)
     across, ahead = frames_along(centres, sign)
     ball = float(radii[0].mean())
-    tube = loft(centres, across, ahead, radii, places, sectors=16, caps=(ball, 0.3 * float(radii[-1].mean())))
+    tube = loft(
+        centres, across, ahead, radii, places, sectors=16, caps=(0.9 * ball, 0.3 * float(radii[-1].mean()))
+    )
     upper = float(np.linalg.norm(points[1] - points[0]))
     lower = float(np.linalg.norm(points[2] - points[1]))
     thick = sample(rows, [1.0, 2.0]).mean(axis=1) * flesh.stature

@@ -19,7 +19,7 @@ Index = NDArray[np.int64]
 
 SAMPLES = np.array([[0.375, 0.125], [0.875, 0.375], [0.625, 0.875], [0.125, 0.625]])
 """Within a pixel: a rotated grid, which smooths edges near the horizontal and the vertical best."""
-KEY_RAYS = 2  # per sample
+KEY_RAYS = 3  # per sample
 LIFT = 0.0015  # rays start this far off the surface [m]
 GLOSS, SHARPNESS = 0.05, 28.0
 GHOST = 0.55
