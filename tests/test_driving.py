@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
+from body_rigs import family_skeleton
 from conftest import recordings
 from gltf_avatars import EXTENSIONS, make_avatar
 from sixpoint.body import rotations as rot
@@ -13,7 +14,7 @@ from sixpoint.body.flesh import build_shape
 from sixpoint.cli import main
 from sixpoint.errors import FormatError
 from sixpoint.formats import load, load_avatar, save
-from sixpoint.jobs.driving import drive, open_avatar
+from sixpoint.jobs.driving import drive, is_on, open_avatar
 from sixpoint.jobs.reading import Reading
 from sixpoint.jobs.reconstruct import Body, reconstruct
 
@@ -110,6 +111,14 @@ def test_driving_on_the_same_body_changes_next_to_nothing(folder):
     targets, solved = drive(figure, motion, sp.Figure.from_motion(motion))
     np.testing.assert_allclose(targets.positions, figure.targets(motion).positions, atol=2e-3)
     assert solved.solution.residual.max() < 0.01
+
+
+def test_names_alone_do_not_make_the_same_body():
+    """A child's motion is not on a tall figure of the same joint names; its own is."""
+    tall, child = sp.Figure.from_stature(1.8), sp.Figure.from_stature(1.2)
+    assert not is_on(sp.make_sample("walk", child), tall)
+    assert is_on(sp.make_sample("walk", tall), tall)
+    assert not is_on(sp.make_sample("walk", tall), sp.Figure.from_skeleton(family_skeleton("unity")))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from sixpoint.errors import SixpointError
 from sixpoint.jobs import render as job
 from sixpoint.render.camera import FIELD, Camera
 from sixpoint.render.colours import paint
-from sixpoint.render.encoding import encode_png, find_codec, lay_out
+from sixpoint.render.encoding import find_codec, lay_out
 from sixpoint.render.light import of_hex, spread_over_sphere, to_linear, to_srgb
 from sixpoint.render.surface import Surface
 
@@ -310,15 +310,6 @@ def test_labels_are_written_in_the_corner():
     changed = np.argwhere((with_label != plain).any(axis=2))
     assert len(changed) > 10
     assert (changed.max(axis=0) < [24, 60]).all()
-
-
-def test_a_palette_makes_small_files(stage):
-    """With a palette a picture is smaller and looks the same."""
-    picture = stage.take(0)
-    small = encode_png(picture, colours=200)
-    assert len(small) < len(encode_png(picture))
-    with Image.open(BytesIO(small)) as image:
-        assert np.abs(np.asarray(image.convert("RGB")).astype(int) - picture).mean() < 4
 
 
 def test_a_single_frame_is_a_picture_without_a_label(file, tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
@@ -15,6 +17,8 @@ from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.retarget import retarget
 from sixpoint.jobs.solving import Solved, Solving, solve
 
+SAME = 1e-3
+"""Part of a body's height within which bones are the same."""
 AVATARS = tuple(suffix for suffix in GLTF_SUFFIXES if suffix != ".vrma")
 
 
@@ -35,8 +39,14 @@ def open_avatar(path: Path, mapping: Path | None = None, limits: Limits | None =
 
 
 def is_on(motion: Motion, figure: Figure) -> bool:
-    """Whether a motion is on a figure's own skeleton, so that nothing has to be solved."""
-    return motion.skeleton.names == figure.skeleton.names
+    """Whether a motion is on a figure's own skeleton, so that nothing has to be solved.
+
+    Names alone do not tell: bodies of other proportions share them.
+    """
+    ours, other = figure.skeleton, motion.skeleton
+    if other.names != ours.names or not np.array_equal(other.parents, ours.parents):
+        return False
+    return bool(np.abs(other.offsets[1:] - ours.offsets[1:]).max(initial=0.0) < SAME * figure.height)
 
 
 def drive(

@@ -28,15 +28,12 @@ GAP = 4
 """Between the pictures of a sheet [pixels]."""
 
 
-def encode_png(picture: Picture, colours: int | None = None) -> bytes:
-    """A picture (height, width, 3) as PNG; with a palette of so many ``colours`` it is a third as large."""
+def encode_png(picture: Picture) -> bytes:
+    """A picture (height, width, 3) as PNG."""
     from PIL import Image
 
-    image = Image.fromarray(picture)
-    if colours is not None:
-        image = image.quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG)
     out = BytesIO()
-    image.save(out, "PNG", optimize=True)
+    Image.fromarray(picture).save(out, "PNG", optimize=True)
     return out.getvalue()
 
 
