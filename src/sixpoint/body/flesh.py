@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.extremities import add_foot, add_hand, add_head
 from sixpoint.body.figure import Figure
 from sixpoint.body.flesh_parts import Flesh, frames_along, smooth_step, weigh_along
 from sixpoint.body.loft import loft, sample
 from sixpoint.body.shape import Shape
+from sixpoint.body.stature import stature_of
 from sixpoint.body.tables import read_shipped
 
 Array = NDArray[np.float64]
@@ -35,11 +35,6 @@ def _sizes() -> dict[str, Any]:
     return read_shipped("flesh.toml")
 
 
-@cache
-def _stature_per_height() -> float:
-    return MEAN_STATURE / Figure.from_stature(MEAN_STATURE).height
-
-
 def build_shape(figure: Figure) -> Shape:
     """A closed, skinned mesh around any figure.
 
@@ -51,7 +46,7 @@ def build_shape(figure: Figure) -> Shape:
     ``data/flesh.toml``.
     """
     positions, world = figure.neutral_pose.compute_transforms()
-    flesh = Flesh(figure, positions, figure.height * _stature_per_height())
+    flesh = Flesh(figure, positions, stature_of(figure))
     sizes = _sizes()
     middle = _add_trunk(flesh, sizes["trunk"], sizes["head"])
     add_head(flesh, sizes["head"], middle)
