@@ -2,7 +2,7 @@
 
 A skin's inverse bind matrix takes a vertex into the frame of a joint, x = L v + m in metres. From it follows
 where the joint was when the mesh was bound, but only up to a placement of the whole mesh; that is taken from
-the mesh's node, from the file's world or from the top joint, whichever comes nearest to the pose of the nodes.
+the mesh's node, the file's world or the top joint, whichever comes nearest to the pose of the nodes.
 
 Reference: Khronos, glTF 2.0 specification, section 3.7.3 (skins).
 """
@@ -122,7 +122,7 @@ def check_one_body(tree: NodeTree, skins: list[Skin]) -> None:
     if len(groups) > 1:
         labels = [tree.document.label("skins", members[0]) for _, members in groups]
         raise tree.document.error(
-            f"the skins are of {len(groups)} separate skeletons: {', '.join(labels)}; export one body per file"
+            f"the skins are of {len(groups)} separate skeletons: {', '.join(labels)}; export one each"
         )
 
 

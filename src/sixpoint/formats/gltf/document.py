@@ -137,11 +137,12 @@ def read_document(path: Path) -> Document:
         )
     source, binary = (data, memoryview(b"")) if is_text else _split_glb(path, data)
     try:
-        content = json.loads(bytes(source).decode("utf-8-sig"))
+        content = json.loads(bytes(source).decode("utf-8-sig"), parse_constant=_no_number)
     except UnicodeDecodeError as error:
         raise FormatError(path, f"the JSON is not UTF-8: {error}") from None
     except json.JSONDecodeError as error:
-        raise FormatError(path, f"the JSON is damaged: {error.msg}", line=error.lineno) from None
+        where = f"line {error.lineno}, column {error.colno}" if is_text else f"character {error.pos}"
+        raise FormatError(path, f"the JSON is damaged at {where}: {error.msg}") from None
     except (RecursionError, ValueError) as error:
         raise FormatError(path, f"the JSON cannot be read: {error}") from None
     try:
@@ -154,6 +155,10 @@ def read_document(path: Path) -> Document:
             what = COMPRESSIONS.get(name, f"the extension {name}")
             raise document.error(f"{what}, which the file requires: not supported; export without it")
     return document
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"{word} is no number in JSON")
 
 
 def _split_glb(path: Path, data: bytes) -> tuple[memoryview, memoryview]:

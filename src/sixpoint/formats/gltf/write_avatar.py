@@ -14,7 +14,6 @@ import numpy as np
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.motion import Motion
-from sixpoint.errors import FigureError
 from sixpoint.formats.gltf.appearance import read_image
 from sixpoint.formats.gltf.avatar import Avatar
 from sixpoint.formats.gltf.builder import Builder
@@ -48,11 +47,7 @@ def format_avatar(motion: Motion, avatar: Avatar) -> bytes:
         FormatError: An image or a buffer of the avatar is missing.
     """
     rig, skeleton = avatar.rig, avatar.figure.skeleton
-    if motion.skeleton is not skeleton and motion.skeleton.names != skeleton.names:
-        raise FigureError(
-            f"the motion is on another skeleton ({len(motion.skeleton)} joints) than the avatar "
-            f"{avatar.name!r} ({len(skeleton)}): pose the avatar's figure from the motion's six points"
-        )
+    avatar.check_rig(motion)
     builder = _copy(avatar.document)
     keys = Keys(builder, len(motion), motion.rate, motion.name)
     local = rig.leave(motion.rotations)
@@ -74,7 +69,12 @@ def format_avatar(motion: Motion, avatar: Avatar) -> bytes:
             keys.add(node % len(nodes), "translation", there, still[0], whole=joint == 0)
         keys.add(node % len(nodes), "rotation", local[:, joint], still[1])
     keys.finish()
-    return builder.to_glb()
+    try:
+        return builder.to_glb()
+    except ValueError:
+        raise avatar.document.error(
+            "it holds numbers that are infinite, which no JSON can be written with"
+        ) from None
 
 
 def _add_root(content: dict[str, Any], name: str, children: list[int]) -> None:
