@@ -19,6 +19,8 @@ from sixpoint.formats.gltf.avatar import Avatar
 from sixpoint.formats.gltf.builder import Builder
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.keys import Keys
+from sixpoint.formats.gltf.nodes import NodeTree
+from sixpoint.formats.gltf.repair import find_repairs, tidy
 
 KNOWN = (
     "VRM",
@@ -48,7 +50,7 @@ def format_avatar(motion: Motion, avatar: Avatar) -> bytes:
     """
     rig, skeleton = avatar.rig, avatar.figure.skeleton
     avatar.check_rig(motion)
-    builder = _copy(avatar.document)
+    builder = _copy(avatar.document, rig.tree)
     keys = Keys(builder, len(motion), motion.rate, motion.name)
     local = rig.leave(motion.rotations)
     nodes = builder.content["nodes"]
@@ -86,10 +88,12 @@ def _add_root(content: dict[str, Any], name: str, children: list[int]) -> None:
             scene["nodes"] = [n for n in roots if n not in children] + [len(content["nodes"]) - 1]
 
 
-def _copy(document: Document) -> Builder:
+def _copy(document: Document, tree: NodeTree) -> Builder:
     """The document without animations, as far as possible without what only these used, in one buffer."""
     content = copy.deepcopy(document.content)
     content.pop("animations", None)
+    tidy(content, tree)
+    repairs = find_repairs(document, content)
     views = content.pop("bufferViews", [])
     content.pop("buffers", None)
     builder = Builder(content)
@@ -114,6 +118,8 @@ def _copy(document: Document) -> Builder:
             picture, kind = read_image(document, index)
             image.pop("uri")
             image |= {"bufferView": builder.add_view(picture), "mimeType": kind}
+    for repair in repairs:
+        repair.apply(builder)
     return builder
 
 
