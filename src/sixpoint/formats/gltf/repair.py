@@ -1,7 +1,7 @@
 """What many exporters get wrong, put right when an avatar is written: nothing that anybody would see.
 
-Bounds of positions that are not those of the numbers, normals and rotations of another length than one, weights
-that do not sum to one or name a joint twice, a skin's skeleton that is not above its joints, empty lists.
+Bounds of positions that are not those of the numbers, normals and rotations of another length than one,
+weights that do not sum to one or name a joint twice, a skeleton that is not above its joints, empty lists.
 
 Reference: Khronos glTF validator, ISSUES.md: errors of the kinds DATA and SEMANTIC.
 """
@@ -35,19 +35,27 @@ class Repair:
 
     Attributes:
         attributes: The attributes of a primitive, in the content that is written.
-        name: Which.
+        name: Which; it was taken out of them.
+        source: Accessors that it came from; what primitives shared stays shared.
         values: (V, 3) or (V, 4).
         dtype: Their component type.
     """
 
     attributes: dict[str, Any]
     name: str
+    source: tuple[int, ...]
     values: NDArray[Any]
     dtype: str = "<f4"
 
-    def apply(self, builder: Builder) -> None:
-        """Add the numbers to the file and use them."""
-        self.attributes[self.name] = builder.add_accessor(self.values, self.dtype, target=VERTICES)
+
+def apply_repairs(builder: Builder, repairs: list[Repair]) -> None:
+    """Add the numbers to the file and use them."""
+    made: dict[tuple[str, tuple[int, ...]], int] = {}
+    for repair in repairs:
+        key = repair.name, repair.source
+        if key not in made:
+            made[key] = builder.add_accessor(repair.values, repair.dtype, target=VERTICES)
+        repair.attributes[repair.name] = made[key]
 
 
 def find_repairs(document: Document, content: dict[str, Any]) -> list[Repair]:
@@ -105,9 +113,9 @@ def _find_vectors(document: Document, attributes: dict[str, Any], label: str) ->
         length = np.linalg.norm(values, axis=1, keepdims=True)
         if np.any(np.abs(length - 1.0) > NOT_UNIT):
             none = length < 1e-12
-            yield Repair(
-                attributes, "NORMAL", np.where(none, (0.0, 1.0, 0.0), values / np.where(none, 1.0, length))
-            )
+            source = (attributes.pop("NORMAL"),)
+            values = np.where(none, (0.0, 1.0, 0.0), values / np.where(none, 1.0, length))
+            yield Repair(attributes, "NORMAL", source, values)
     if "TANGENT" in attributes and _plain(document, attributes["TANGENT"]):
         values = read_floats(document, attributes["TANGENT"], "VEC4", f"TANGENT of {label}")
         length = np.linalg.norm(values[:, :3], axis=1)
@@ -136,11 +144,9 @@ def _find_weights(document: Document, attributes: dict[str, Any], label: str) ->
         return
     weights[weights.sum(axis=1) == 0, 0] = 1.0
     packed, shared = pack_weights(picked, weights)
-    for k in range(2):
-        attributes.pop(f"JOINTS_{k}", None)
-        attributes.pop(f"WEIGHTS_{k}", None)
+    source = tuple(attributes.pop(f"{name}_{k}") for k in sets for name in ("JOINTS", "WEIGHTS"))
     small = "<u1" if packed.max() < 256 else "<u2"
     for k in range(packed.shape[1] // 4):
         here = slice(4 * k, 4 * k + 4)
-        yield Repair(attributes, f"JOINTS_{k}", packed[:, here], small)
-        yield Repair(attributes, f"WEIGHTS_{k}", shared[:, here])
+        yield Repair(attributes, f"JOINTS_{k}", source, packed[:, here], small)
+        yield Repair(attributes, f"WEIGHTS_{k}", source, shared[:, here])

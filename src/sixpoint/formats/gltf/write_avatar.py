@@ -20,7 +20,7 @@ from sixpoint.formats.gltf.builder import Builder
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.keys import Keys
 from sixpoint.formats.gltf.nodes import NodeTree
-from sixpoint.formats.gltf.repair import find_repairs, tidy
+from sixpoint.formats.gltf.repair import apply_repairs, find_repairs, tidy
 
 KNOWN = (
     "VRM",
@@ -118,8 +118,7 @@ def _copy(document: Document, tree: NodeTree) -> Builder:
             picture, kind = read_image(document, index)
             image.pop("uri")
             image |= {"bufferView": builder.add_view(picture), "mimeType": kind}
-    for repair in repairs:
-        repair.apply(builder)
+    apply_repairs(builder, repairs)
     return builder
 
 
