@@ -229,6 +229,9 @@ def _add_meshes(
             "skin": builder.add("skins", skin),
         }
         roots.append(builder.add("nodes", node))
+    if style.z_up:  # as COLLADA's converters do
+        builder.content["nodes"][0]["children"] += roots
+        return []
     return roots
 
 

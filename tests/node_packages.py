@@ -24,7 +24,9 @@ def _install(names: tuple[str, ...]) -> tuple[Path | None, str]:
     if not all((modules / name).is_dir() for name in names):
         call = ["npm", "install", "--no-audit", "--no-fund", "--ignore-scripts", *names]
         try:
-            done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False)
+            done = subprocess.run(
+                call, cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False
+            )
         except subprocess.TimeoutExpired:
             return None, f"npm install {' '.join(names)} took too long"
         if done.returncode:

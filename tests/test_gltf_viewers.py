@@ -1,4 +1,4 @@
-"""What we write, in programs of others: the Khronos validator, three.js and three-vrm in headless Chromium."""
+"""What we write, in programs of others: the Khronos validator; three.js and three-vrm in Chromium."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_avatars import EXTENSIONS, STYLES, make_avatar
-from node_packages import node_modules
 
 import sixpoint as sp
 from conftest import recordings
+from gltf_avatars import EXTENSIONS, STYLES, make_avatar
+from node_packages import node_modules
 from sixpoint.body.motion import Motion
 from sixpoint.formats import load, load_avatar, save
 from sixpoint.formats.gltf.avatar import Avatar
@@ -164,7 +164,9 @@ def test_the_validator_finds_no_error_in_driven_characters(path, data, tmp_path)
 @pytest.fixture(scope="module")
 def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Path]]:
     """A page with three.js in headless Chromium, and the folder whose files it can load."""
-    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed: pip install playwright")
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="Playwright is not installed: pip install playwright"
+    )
     modules = node_modules(*PACKAGES)
     folder = tmp_path_factory.mktemp("viewer")
 
@@ -179,7 +181,9 @@ def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Path
         return route.fulfill(body=path.read_bytes(), content_type=kind)
 
     with api.sync_playwright() as playwright:
-        found = shutil.which("chromium") or shutil.which("google-chrome") or playwright.chromium.executable_path
+        found = (
+            shutil.which("chromium") or shutil.which("google-chrome") or playwright.chromium.executable_path
+        )
         if not Path(found).is_file():
             pytest.skip("no Chromium: install it, or run `playwright install chromium`")
         browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
