@@ -139,7 +139,7 @@ def test_what_does_not_move_costs_one_key(tmp_path, boxing):
 
 
 def test_pictures_beside_the_file_come_into_it(tmp_path, boxing):
-    """An external picture and an external buffer are embedded; a missing one is said before anything is written."""
+    """An external picture is embedded; a missing one is said before anything is written."""
 
     def outside(builder: Any, nodes: dict[str, int]) -> None:
         builder.content["images"] = [{"uri": "skin%20colour.png"}]
@@ -213,7 +213,7 @@ def test_one_frame_is_a_file_too(tmp_path):
 
 @pytest.mark.parametrize("name", ["vrm0", "vrm1", "bones"])
 def test_a_vrm_animation_of_a_vrm_is_exact(name, tmp_path):
-    """All bones of its map are where they were, facing +Z, in frames that are aligned with the world in T-pose."""
+    """All bones of its map are where they were, facing +Z; in T-pose their frames are the world's."""
     avatar = put(tmp_path, name)
     motion = wild(avatar)
     motion = Motion(motion.skeleton, motion.rotations, motion.translations[:, :1], motion.rate)
@@ -264,7 +264,7 @@ def test_wrong_requests_say_what_to_do(tmp_path, boxing):
     other = sp.make_sample("walk")
     motion = wild(avatar)
     out = tmp_path / "out.glb"
-    with pytest.raises(FormatError, match=r"another skeleton \(34 joints\).*'vrm1' \(22 joints\)|34 joints"):
+    with pytest.raises(FormatError, match=r"another skeleton \(34 joints\).*'vrm1' \(21\)"):
         save(other, out, avatar=avatar)
     with pytest.raises(FormatError, match="34 joints"):
         save(other, tmp_path / "out.vrma", avatar=avatar)
