@@ -142,7 +142,7 @@ def _read_triangles(
     if "indices" in primitive:
         what = f"indices of {label}"
         order = read_indices(document, primitive["indices"], "SCALAR", what)[:, 0]
-        if order.max() >= len(points):
+        if order.max(initial=0) >= len(points) and len(order):
             raise document.error(
                 f"accessors[{primitive['indices']}] ({what}) names vertex {order.max()} of {len(points)}"
             )
@@ -151,7 +151,7 @@ def _read_triangles(
     if mode == TRIANGLES:
         triangles = order[: len(order) // 3 * 3].reshape(-1, 3)
     elif mode == FAN:
-        triangles = np.column_stack([np.full(max(len(order) - 2, 0), order[0]), order[1:-1], order[2:]])
+        triangles = np.column_stack([np.repeat(order[:1], max(len(order) - 2, 0)), order[1:-1], order[2:]])
     else:
         triangles = np.column_stack([order[:-2], order[1:-1], order[2:]])
         triangles[1::2] = triangles[1::2, [1, 0, 2]]

@@ -100,6 +100,8 @@ def _set_bounds(document: Document, content: dict[str, Any], table: dict[str, in
     index = table.get("POSITION")
     if index is not None and _plain(document, index):
         values = read_floats(document, index, "VEC3", f"POSITION of {label}")
+        if not len(values):
+            return
         content["accessors"][index] |= {
             "min": values.min(axis=0).tolist(),
             "max": values.max(axis=0).tolist(),
@@ -133,7 +135,7 @@ def _find_weights(document: Document, attributes: dict[str, Any], label: str) ->
     shares = [
         read_floats(document, attributes[f"WEIGHTS_{k}"], "VEC4", f"WEIGHTS_{k} of {label}") for k in sets
     ]
-    if len({len(rows) for rows in (*joints, *shares)}) > 1:
+    if len({len(rows) for rows in (*joints, *shares)}) > 1 or not len(joints[0]):
         return
     picked, weights = np.hstack(joints), np.maximum(np.hstack(shares), 0.0)
     off = np.abs(weights.sum(axis=1) - 1.0) > SUM_OFF * np.sum(weights > 0, axis=1)
