@@ -69,6 +69,7 @@ class Style:
     more: Any = None
 
 
+META = {"name": "test", "authors": ["nobody"], "licenseUrl": "https://vrm.dev/licenses/1.0/"}
 STYLES = {
     "vrm0": Style(vrm=0),
     "vrm1": Style(vrm=1, turned=True, mesh="two skins"),
@@ -164,7 +165,7 @@ def make_avatar(style: Style | str) -> bytes:
         builder.content["extensionsUsed"] = ["VRM"]
     elif style.vrm == 1:
         found = {name: {"node": node} for name, node in nodes.items()}
-        extension = {"specVersion": "1.0", "humanoid": {"humanBones": found}, "meta": {"name": "test"}}
+        extension = {"specVersion": "1.0", "humanoid": {"humanBones": found}, "meta": META}
         builder.content |= {"extensions": {"VRMC_vrm": extension}, "extensionsUsed": ["VRMC_vrm"]}
     if style.more is not None:
         style.more(builder, nodes)
@@ -228,6 +229,9 @@ def _add_meshes(
             "skin": builder.add("skins", skin),
         }
         roots.append(builder.add("nodes", node))
+    if style.z_up:  # as COLLADA's converters do
+        builder.content["nodes"][0]["children"] += roots
+        return []
     return roots
 
 

@@ -205,7 +205,7 @@ def _format_gltf(
 ) -> bytes:
     try:
         if suffix == ".vrma":
-            return format_vrma(motion, None if avatar is None else avatar.figure)
+            return format_vrma(motion, avatar)
         if avatar is None:
             return format_figure(motion, shape, appearance)
         if shape is not None or appearance is not None:

@@ -60,7 +60,7 @@ def _read(document: Document, index: int, kind: str, what: str) -> NDArray[np.ge
         raise document.error(f"{where} is sparse: not supported; export without sparse accessors")
     dtype = np.dtype("<" + COMPONENTS[accessor["componentType"]])
     count, width = accessor["count"], WIDTHS[kind]
-    if "bufferView" not in accessor:
+    if "bufferView" not in accessor or not count:
         if count > MOST_ZEROS:
             raise document.error(f"{where} has no data for its {count} elements")
         return np.zeros((count, width), dtype)
@@ -70,7 +70,7 @@ def _read(document: Document, index: int, kind: str, what: str) -> NDArray[np.ge
             raise document.error(f"{where}: {COMPRESSIONS[name]}: not supported; export without compression")
     data = document.buffer(view["buffer"])
     size = dtype.itemsize * width
-    stride = view.get("byteStride", size)
+    stride = view.get("byteStride") or size
     start = view.get("byteOffset", 0)
     end = start + view["byteLength"]
     first = start + accessor.get("byteOffset", 0)

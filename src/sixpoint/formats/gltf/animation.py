@@ -103,6 +103,8 @@ def read_channels(document: Document, index: int) -> list[Channel]:
         values = read_floats(document, sampler["output"], TYPES[path], what)
         interpolation = sampler.get("interpolation", "LINEAR")
         cubic = interpolation == "CUBICSPLINE"
+        if not len(times):
+            raise document.error(f"accessors[{sampler['input']}] (key times of {what}) is empty")
         if np.any(np.diff(times) < 0):
             raise document.error(
                 f"accessors[{sampler['input']}] (key times of {what}) must not go back in time"

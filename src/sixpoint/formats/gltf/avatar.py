@@ -87,6 +87,19 @@ class Avatar:
         found = self.document.items("animations")
         return tuple(str(a.get("name", f"animation_{k}")) for k, a in enumerate(found))
 
+    def check_rig(self, motion: Motion) -> None:
+        """Refuse a motion that is on another skeleton.
+
+        Raises:
+            FigureError: Saying what to do.
+        """
+        mine, other = self.figure.skeleton, motion.skeleton
+        if other is not mine and other.names != mine.names:
+            raise FigureError(
+                f"the motion is on another skeleton ({len(other)} joints) than the avatar {self.name!r} "
+                f"({len(mine)}): pose the avatar's figure from the motion's six points"
+            )
+
     def read_motion(self, rate: float | None = None) -> Motion:
         """The first animation, or one frame of the pose that the nodes have where there is none.
 

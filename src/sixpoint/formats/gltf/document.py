@@ -24,7 +24,10 @@ from sixpoint.formats.source import read_bytes
 MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 
-READ_REQUIRED = ("VRM", "VRMC_", "KHR_materials_", "KHR_texture_", "KHR_mesh_quantization", "KHR_lights_")
+READ_REQUIRED = (
+    *("VRM", "VRMC_", "KHR_materials_", "KHR_texture_", "KHR_mesh_quantization", "KHR_lights_"),
+    *("KHR_node_", "KHR_xmp", "KHR_animation_pointer", "EXT_texture_", "MSFT_texture_"),
+)
 """Beginnings of extensions that a file may require without harm to skeleton, skin and movement."""
 COMPRESSIONS = {
     "KHR_draco_mesh_compression": "Draco-compressed meshes (KHR_draco_mesh_compression)",
@@ -137,11 +140,13 @@ def read_document(path: Path) -> Document:
         )
     source, binary = (data, memoryview(b"")) if is_text else _split_glb(path, data)
     try:
-        content = json.loads(bytes(source).decode("utf-8-sig"))
+        text = bytes(source).rstrip(b"\0 ").decode("utf-8-sig")
+        content = json.loads(text, parse_constant=_no_number, object_pairs_hook=_without_nulls)
     except UnicodeDecodeError as error:
         raise FormatError(path, f"the JSON is not UTF-8: {error}") from None
     except json.JSONDecodeError as error:
-        raise FormatError(path, f"the JSON is damaged: {error.msg}", line=error.lineno) from None
+        where = f"line {error.lineno}, column {error.colno}" if is_text else f"character {error.pos}"
+        raise FormatError(path, f"the JSON is damaged at {where}: {error.msg}") from None
     except (RecursionError, ValueError) as error:
         raise FormatError(path, f"the JSON cannot be read: {error}") from None
     try:
@@ -154,6 +159,15 @@ def read_document(path: Path) -> Document:
             what = COMPRESSIONS.get(name, f"the extension {name}")
             raise document.error(f"{what}, which the file requires: not supported; export without it")
     return document
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"{word} is no number in JSON")
+
+
+def _without_nulls(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Some exporters write null for what is not there."""
+    return {key: value for key, value in pairs if value is not None}
 
 
 def _split_glb(path: Path, data: bytes) -> tuple[memoryview, memoryview]:
@@ -177,7 +191,7 @@ def _split_glb(path: Path, data: bytes) -> tuple[memoryview, memoryview]:
                 f"{length - start - 8} are left",
             )
         chunks.append((kind, view[start + 8 : start + 8 + size]))
-        start += 8 + size + -size % 4
+        start += 8 + size
     if not chunks or chunks[0][0] != JSON_CHUNK:
         raise FormatError(path, "the first chunk of the GLB is not JSON")
     binaries = [chunk for kind, chunk in chunks[1:2] if kind == BIN_CHUNK]

@@ -73,8 +73,7 @@ def read_pieces(rig: Rig, skins: list[Skin], positions: Array, rotations: Array)
     for node in tree.order:
         content = document.items("nodes")[node]
         carrier = rig.joint_of(node)
-        skinned = "skin" in content
-        if "mesh" not in content or not tree.in_scene[node] or (carrier is None and not skinned):
+        if "mesh" not in content or not tree.in_scene[node] or (carrier is None and "skin" not in content):
             continue
         mesh = content["mesh"]
         for p, primitive in enumerate(document.items("meshes")[mesh]["primitives"]):
@@ -83,13 +82,14 @@ def read_pieces(rig: Rig, skins: list[Skin], positions: Array, rotations: Array)
             if found is None:
                 continue
             points, triangles, used = found
-            if skinned:
+            # A skin without weights, which is against the rules, moves nothing: the mesh stays on its node.
+            if "skin" in content and "JOINTS_0" in primitive["attributes"]:
                 skin = skins[content["skin"]]
                 local, weights = _read_weights(document, primitive, label, used, skin)
                 joints = np.array([row[n] for n in skin.nodes])[local]
                 points = _bind(points, skin, local, weights, positions[joints], rotations[joints])
             else:
-                assert carrier is not None
+                carrier = carrier or 0
                 world = tree.world[node]
                 points = rot.mul_vec(rig.turn, points @ world[:3, :3].T + world[:3, 3])
                 joints, weights = np.full((len(points), 1), carrier), np.ones((len(points), 1))
@@ -142,7 +142,7 @@ def _read_triangles(
     if "indices" in primitive:
         what = f"indices of {label}"
         order = read_indices(document, primitive["indices"], "SCALAR", what)[:, 0]
-        if order.max() >= len(points):
+        if order.max(initial=0) >= len(points) and len(order):
             raise document.error(
                 f"accessors[{primitive['indices']}] ({what}) names vertex {order.max()} of {len(points)}"
             )
@@ -151,7 +151,7 @@ def _read_triangles(
     if mode == TRIANGLES:
         triangles = order[: len(order) // 3 * 3].reshape(-1, 3)
     elif mode == FAN:
-        triangles = np.column_stack([np.full(max(len(order) - 2, 0), order[0]), order[1:-1], order[2:]])
+        triangles = np.column_stack([np.repeat(order[:1], max(len(order) - 2, 0)), order[1:-1], order[2:]])
     else:
         triangles = np.column_stack([order[:-2], order[1:-1], order[2:]])
         triangles[1::2] = triangles[1::2, [1, 0, 2]]
@@ -178,8 +178,6 @@ def _read_weights(
         if len(joints[-1]) <= used.max() or len(weights[-1]) <= used.max():
             raise document.error(f"{label} has {names[0]} and {names[1]} for only a part of its vertices")
     skin_label = document.label("skins", skin.index)
-    if not joints:
-        raise document.error(f"{label} is skinned by {skin_label} but has no JOINTS_0 and WEIGHTS_0")
     picked, share = np.hstack([j[used] for j in joints]), np.hstack([w[used] for w in weights])
     if np.any(share < 0):
         raise document.error(f"{label} has negative weights")

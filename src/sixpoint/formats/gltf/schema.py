@@ -157,7 +157,7 @@ _NODE = record(
 _ACCESSOR = record(
     {
         "componentType": one_of(*COMPONENTS),
-        "count": whole(1),
+        "count": whole(),
         "type": one_of(*WIDTHS),
     },
     bufferView=index("bufferViews"),
@@ -166,9 +166,9 @@ _ACCESSOR = record(
     sparse=record(),
 )
 _VIEW = record(
-    {"buffer": index("buffers"), "byteLength": whole(1)},
+    {"buffer": index("buffers"), "byteLength": whole()},
     byteOffset=whole(),
-    byteStride=whole(4, 252),
+    byteStride=whole(0, 252),
     extensions=record(),
 )
 _TARGET = record(
@@ -195,7 +195,7 @@ _DOCUMENT = record(
     {"asset": record({"version": text}, minVersion=text)},
     accessors=many(_ACCESSOR),
     animations=many(_ANIMATION),
-    buffers=many(record({"byteLength": whole(1)}, uri=text)),
+    buffers=many(record({"byteLength": whole()}, uri=text)),
     bufferViews=many(_VIEW),
     images=many(record(uri=text, bufferView=index("bufferViews"), mimeType=text, name=text)),
     materials=many(_MATERIAL),

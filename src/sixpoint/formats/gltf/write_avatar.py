@@ -14,12 +14,13 @@ import numpy as np
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.motion import Motion
-from sixpoint.errors import FigureError
 from sixpoint.formats.gltf.appearance import read_image
 from sixpoint.formats.gltf.avatar import Avatar
 from sixpoint.formats.gltf.builder import Builder
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.keys import Keys
+from sixpoint.formats.gltf.nodes import NodeTree
+from sixpoint.formats.gltf.repair import apply_repairs, find_repairs, tidy
 
 KNOWN = (
     "VRM",
@@ -48,12 +49,8 @@ def format_avatar(motion: Motion, avatar: Avatar) -> bytes:
         FormatError: An image or a buffer of the avatar is missing.
     """
     rig, skeleton = avatar.rig, avatar.figure.skeleton
-    if motion.skeleton is not skeleton and motion.skeleton.names != skeleton.names:
-        raise FigureError(
-            f"the motion is on another skeleton ({len(motion.skeleton)} joints) than the avatar "
-            f"{avatar.name!r} ({len(skeleton)}): pose the avatar's figure from the motion's six points"
-        )
-    builder = _copy(avatar.document)
+    avatar.check_rig(motion)
+    builder = _copy(avatar.document, rig.tree)
     keys = Keys(builder, len(motion), motion.rate, motion.name)
     local = rig.leave(motion.rotations)
     nodes = builder.content["nodes"]
@@ -74,7 +71,12 @@ def format_avatar(motion: Motion, avatar: Avatar) -> bytes:
             keys.add(node % len(nodes), "translation", there, still[0], whole=joint == 0)
         keys.add(node % len(nodes), "rotation", local[:, joint], still[1])
     keys.finish()
-    return builder.to_glb()
+    try:
+        return builder.to_glb()
+    except ValueError:
+        raise avatar.document.error(
+            "it holds numbers that are infinite, which no JSON can be written with"
+        ) from None
 
 
 def _add_root(content: dict[str, Any], name: str, children: list[int]) -> None:
@@ -86,10 +88,12 @@ def _add_root(content: dict[str, Any], name: str, children: list[int]) -> None:
             scene["nodes"] = [n for n in roots if n not in children] + [len(content["nodes"]) - 1]
 
 
-def _copy(document: Document) -> Builder:
+def _copy(document: Document, tree: NodeTree) -> Builder:
     """The document without animations, as far as possible without what only these used, in one buffer."""
     content = copy.deepcopy(document.content)
     content.pop("animations", None)
+    tidy(content, tree)
+    repairs = find_repairs(document, content)
     views = content.pop("bufferViews", [])
     content.pop("buffers", None)
     builder = Builder(content)
@@ -114,6 +118,7 @@ def _copy(document: Document) -> Builder:
             picture, kind = read_image(document, index)
             image.pop("uri")
             image |= {"bufferView": builder.add_view(picture), "mimeType": kind}
+    apply_repairs(builder, repairs)
     return builder
 
 

@@ -20,13 +20,11 @@ from sixpoint.errors import FigureError
 from sixpoint.formats.gltf.builder import INDICES, VERTICES, Builder
 from sixpoint.formats.gltf.keys import Keys
 from sixpoint.formats.gltf.nodes import SITE
+from sixpoint.formats.gltf.weights import pack_weights
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 GREY = [0.6, 0.6, 0.62, 1.0]
-MOST_CARRIERS = 8
-"""Joints per vertex that are written, two sets of four; the heaviest stay."""
 
 
 def format_figure(motion: Motion, shape: Shape | None = None, appearance: Appearance | None = None) -> bytes:
@@ -76,7 +74,7 @@ def add_nodes(builder: Builder, skeleton: Skeleton) -> None:
 
 def _add_mesh(builder: Builder, skeleton: Skeleton, shape: Shape, appearance: Appearance | None) -> int:
     """Mesh, skin and material; the index of the node that shows them."""
-    joints, weights = _carriers(shape)
+    joints, weights = pack_weights(shape.joints, shape.weights)
     attributes = {
         "POSITION": builder.add_accessor(shape.vertices, target=VERTICES, bounds=True),
         "NORMAL": builder.add_accessor(_normals(shape), target=VERTICES),
@@ -116,28 +114,6 @@ def _free_name(name: str, skeleton: Skeleton) -> str:
     while name in skeleton.names:
         name += "_mesh"
     return name
-
-
-def _carriers(shape: Shape) -> tuple[Index, Array]:
-    """Joints and weights (V, 4 or 8): none twice, the heaviest first, in single precision sums of one."""
-    count, width = shape.joints.shape
-    joints, weights = shape.joints.copy(), shape.weights.copy()
-    for a in range(width):  # a joint that is named twice carries both weights once
-        for b in range(a):
-            twice = (joints[:, a] == joints[:, b]) & (weights[:, a] > 0)
-            weights[twice, b] += weights[twice, a]
-            weights[twice, a] = 0.0
-    order = np.argsort(-weights, axis=1, kind="stable")[:, :MOST_CARRIERS]
-    rows = np.arange(count)[:, None]
-    joints, weights = joints[rows, order], weights[rows, order]
-    used = max(int(np.sum(weights.max(axis=0, initial=0.0) > 0)), 1)
-    full = 4 if used <= 4 else MOST_CARRIERS
-    out_joints, out_weights = np.zeros((count, full), np.int64), np.zeros((count, full))
-    kept = min(full, joints.shape[1])
-    out_joints[:, :kept], out_weights[:, :kept] = joints[:, :kept], weights[:, :kept]
-    out_weights /= out_weights.sum(axis=1, keepdims=True)
-    out_weights = out_weights.astype(np.float32).astype(np.float64)
-    return np.where(out_weights > 0, out_joints, 0), out_weights
 
 
 def _normals(shape: Shape) -> Array:
