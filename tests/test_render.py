@@ -68,6 +68,12 @@ def figure_mask(picture):
     return spread > 40
 
 
+def _first_frame(file):
+    out = file.with_name("first.png")
+    job.render(file, out, look=job.Look(size=SIZE, pictures=1), force=True)
+    return out.read_bytes()
+
+
 # --- camera and light ----------------------------------------------------------------------------
 
 
@@ -265,9 +271,13 @@ def test_a_film_has_the_frames_of_its_rate_and_real_speed(file, tmp_path):
         assert (stream.width, stream.height) == SIZE
         assert stream.average_rate == 15
         assert stream.pix_fmt == "yuv420p" or find_codec()[0] != "libx264"
-        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+        decoded = list(film.decode(stream))
+        assert {frame.colorspace for frame in decoded} == {1}  # BT.709
+        pictures = [frame.to_ndarray(format="rgb24", src_colorspace="ITU709") for frame in decoded]
     assert len(pictures) == done.pictures == 8
     assert figure_mask(pictures[3]).mean() > 0.03
+    still = np.asarray(Image.open(BytesIO(_first_frame(file))).convert("RGB")).astype(int)
+    assert np.abs(still - pictures[0]).mean() < 4
 
 
 def test_another_codec_stands_in(monkeypatch):

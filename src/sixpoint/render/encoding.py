@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from io import BytesIO
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,11 +83,18 @@ def encode_film(pictures: Iterable[Picture], rate: float) -> bytes:
                 stream = cast("VideoStream", added)
                 stream.height, stream.width = picture.shape[:2]
                 stream.pix_fmt = "yuv420p"
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+                _mark_colours(stream.codec_context)
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            film.mux(stream.encode(frame.reformat(format="yuv420p", dst_colorspace="ITU709")))
         if stream is None:
             raise SixpointError("a film needs at least one picture")
         film.mux(stream.encode(None))
     return file.getvalue()
+
+
+def _mark_colours(codec: Any) -> None:
+    """Say that colours are BT.709's (number 1 in H.264's tables): players guess by the size otherwise."""
+    codec.colorspace = codec.color_primaries = codec.color_trc = codec.color_range = 1
 
 
 def find_codec() -> tuple[str, dict[str, str]]:
