@@ -178,8 +178,13 @@ def _set_limb(
     hang = rot.from_axis_angle(X, np.pi) if along @ Y > 0.99 else rot.between(along, -Y)
     guess = rot.mul_vec(rot.inv(neutral[root]), rot.mul_vec(rot.inv(hang), X))
     axis_upper, axis_lower = find_flexion_axes(skeleton, chain, guess, flexes_back, motion, frames)
-    _turn(neutral, skeleton.subtree(root), root, axis_upper, upper)
-    _turn(neutral, skeleton.subtree(middle), middle, axis_lower, lower)
+    for joint, axis, bone in ((root, axis_upper, upper), (middle, axis_lower, lower)):
+        if not np.linalg.norm(np.cross(axis, rot.unit(bone))) > 1e-6:
+            name = skeleton.names[joint]
+            raise FigureError(
+                f"the rest pose does not tell about which axis {name!r} bends: it lies along the bone"
+            )
+        _turn(neutral, skeleton.subtree(joint), joint, axis, bone)
 
 
 def _turn(neutral: Array, below: Index, joint: int, axis: Array, bone: Array) -> None:

@@ -15,15 +15,15 @@ def convert(
     source: Annotated[
         Path,
         Parameter(
-            help="A motion (.bvh, .amc, .asf, .usd), six points (.csv, .npz) or markers (.c3d, .trc, .csv, "
-            ".npz, .json)."
+            help="A motion (.bvh, .amc, .asf, .glb, .vrm, .usd ...), six points (.csv, .npz) or markers "
+            "(.c3d, .trc, .csv, .npz, .json)."
         ),
     ],
     out: Annotated[
         Path,
         Parameter(
-            help="A motion (.bvh, .usd, .amc with its .asf), its six points (.csv, .npz), its joint angles "
-            "(.mot), or markers (.c3d, .trc, .csv, .npz)."
+            help="A motion (.bvh, .amc with its .asf, .glb, .vrma, .usd ...), its six points (.csv, .npz), "
+            "its joint angles (.mot), or markers (.c3d, .trc, .csv, .npz)."
         ),
     ],
     /,
@@ -63,6 +63,7 @@ def convert(
     sixpoint convert 17_10.amc boxing.bvh --out-unit cm
     sixpoint convert boxing.bvh boxing.usdc
     sixpoint convert boxing.bvh boxing_points.csv
+    sixpoint convert boxing.bvh boxing.vrma
     sixpoint convert boxing_points.csv boxing_points.npz --frames 0:600
     sixpoint convert boxing.bvh angles.mot
     sixpoint convert gait.c3d gait.trc --fill 0.1 --low-pass 6

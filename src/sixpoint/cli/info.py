@@ -22,8 +22,8 @@ def info(
     file: Annotated[
         Path,
         Parameter(
-            help="A motion (.bvh, .amc, .asf), six points (.csv, .npz) or markers (.c3d, .trc, .csv, .npz, "
-            ".json)."
+            help="A motion or avatar (.bvh, .amc, .asf, .glb, .vrm, .usd ...), six points (.csv, .npz) or "
+            "markers (.c3d, .trc, .csv, .npz, .json)."
         ),
     ],
     /,
@@ -42,7 +42,7 @@ def info(
 
     ```
     sixpoint info 17_10.amc
-    sixpoint info avatar.bvh --tree
+    sixpoint info avatar.vrm --tree
     sixpoint info points.csv
     sixpoint info gait.c3d
     ```
@@ -79,6 +79,9 @@ def _show_motion(screen: Screen, found: MotionInfo, tree: bool) -> None:
             ("root moves", describe.describe_box(motion.root_positions)),
         ]
     )
+    if found.avatar is not None:
+        screen.say("avatar", style="bold")
+        screen.rows(describe.describe_avatar(found))
     if found.figure is None:
         screen.say("no human figure", style="bold yellow")
         screen.rows([("why", found.problem)])

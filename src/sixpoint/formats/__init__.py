@@ -1,25 +1,13 @@
-"""Files to motions, targets and markers, and back; joint angles to files. The suffix says which format.
+"""Files to motions, avatars, markers and targets, and back; the suffix says which format.
 
 Degrees, inches, centimetres and Z-up worlds exist only in this room: what comes out is in metres, radians
 and Y up, and what goes into a file is in the unit and axes of the file it once came from. Reading raises
 ``FormatError`` with the line; writing is whole or not at all.
 """
 
-from __future__ import annotations
-
-from dataclasses import replace
-from pathlib import Path
-
-from sixpoint.body.motion import Motion
-from sixpoint.body.shape import Shape
-from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, SixpointError, listed
-from sixpoint.formats.acclaim_write import format_amc, format_asf, plan_bones
-from sixpoint.formats.amc import find_skeleton, read_acclaim
+from sixpoint.formats.amc import find_skeleton
 from sixpoint.formats.angles import ANGLE_SUFFIXES, save_angles
-from sixpoint.formats.atomic import check_writable, write_files
-from sixpoint.formats.bvh import read_bvh
-from sixpoint.formats.bvh_write import format_bvh
+from sixpoint.formats.gltf.avatar import GLTF_SUFFIXES, Avatar, load_avatar
 from sixpoint.formats.markers import (
     MARKER_OUTPUTS,
     MARKER_SUFFIXES,
@@ -27,20 +15,31 @@ from sixpoint.formats.markers import (
     load_markers,
     save_markers,
 )
-from sixpoint.formats.npz import format_npz, read_npz
-from sixpoint.formats.space import detect_space, enter_world, leave_world, parse_unit, parse_up
-from sixpoint.formats.tables import format_csv, read_csv
-from sixpoint.formats.usd import USD_SUFFIXES
-from sixpoint.formats.usd.read import read_usd
-from sixpoint.formats.usd.write import format_usd
+from sixpoint.formats.motions import load, load_shape, save
+from sixpoint.formats.points import load_targets, save_targets
+from sixpoint.formats.suffixes import (
+    MOTION_SUFFIXES,
+    OUTPUT_SUFFIXES,
+    SHAPE_OUTPUTS,
+    SHAPE_SUFFIXES,
+    TARGET_SUFFIXES,
+)
 
 __all__ = [
     "ANGLE_SUFFIXES",
+    "GLTF_SUFFIXES",
     "MARKER_OUTPUTS",
     "MARKER_SUFFIXES",
+    "MOTION_SUFFIXES",
+    "OUTPUT_SUFFIXES",
+    "SHAPE_OUTPUTS",
+    "SHAPE_SUFFIXES",
+    "TARGET_SUFFIXES",
+    "Avatar",
     "find_skeleton",
     "holds_markers",
     "load",
+    "load_avatar",
     "load_markers",
     "load_shape",
     "load_targets",
@@ -49,207 +48,3 @@ __all__ = [
     "save_markers",
     "save_targets",
 ]
-
-MOTION_SUFFIXES = (".bvh", ".amc", ".asf", *USD_SUFFIXES)
-OUTPUT_SUFFIXES = (".bvh", ".amc", *USD_SUFFIXES)
-"""What a motion is written as."""
-TARGET_SUFFIXES = (".csv", ".npz")
-
-_NOT_YET = (".glb", ".gltf", ".vrm")
-_FBX = (
-    "FBX files are not read; convert it, e.g. in Blender: File > Import > FBX, then "
-    "File > Export > Motion Capture (.bvh)"
-)
-
-
-def load(
-    path: str | Path,
-    *,
-    skeleton: str | Path | None = None,
-    unit: str | float | None = None,
-    up: str | None = None,
-    rate: float | None = None,
-) -> Motion:
-    """Read a motion from a .bvh, .amc, .asf or .usd, .usda, .usdc file.
-
-    An ASF alone is one frame of its rest pose. Of a USD stage the first animated skeleton is read.
-
-    Args:
-        path: The file.
-        skeleton: The .asf of an .amc file; by default it is looked for beside it.
-        unit: Metres per file unit, or one of m, cm, mm, inch, cmu. By default the file's; guessed from
-            the size of the body for BVH, which states none.
-        up: Up axis of the file, "y" or "z"; by default guessed from the posture for BVH, Y for AMC, and the
-            file's for USD.
-        rate: Frames per second [Hz] in place of the file's. AMC states none: 120 by default.
-
-    Returns:
-        The motion in metres and Y up; ``motion.space`` says what the file had.
-
-    Raises:
-        FormatError: The file cannot be read; the message has the line and what was expected there.
-    """
-    path = Path(path)
-    suffix = _check_suffix(path, MOTION_SUFFIXES, "motions")
-    _check_rate(path, rate)
-    if skeleton is not None and suffix != ".amc":
-        raise FormatError(path, f"a skeleton file belongs to an .amc, not to a {suffix}: leave it out")
-    try:
-        if suffix == ".bvh":
-            raw = read_bvh(path)
-            motion = enter_world(raw, detect_space(path, raw, unit, up))
-            return motion if rate is None else replace(motion, rate=rate)
-        if suffix in USD_SUFFIXES:
-            raw, _ = read_usd(path)
-            raw = raw if rate is None else replace(raw, rate=rate)
-        else:
-            raw = read_acclaim(path, skeleton, rate)
-        space = raw.space
-        if unit is not None:
-            space = replace(space, unit=parse_unit(path, unit), unit_source="given")
-        if up is not None:
-            space = replace(space, up=parse_up(path, up), up_source="given")
-        return enter_world(raw, space)
-    except SixpointError as error:
-        raise _with_path(path, error) from error
-
-
-def load_shape(path: str | Path) -> Shape | None:
-    """Read the surface that is skinned to the rig of a .usd, .usda or .usdc file.
-
-    Args:
-        path: The file.
-
-    Returns:
-        All its skinned meshes as one shape [m], on the joints that ``load`` gives; None where there is none.
-
-    Raises:
-        FormatError: The file cannot be read.
-    """
-    path = Path(path)
-    _check_suffix(path, USD_SUFFIXES, "surfaces")
-    motion, shape = read_usd(path)
-    unit = motion.space.unit
-    if shape is None or unit == 1.0:
-        return shape
-    return replace(shape, vertices=shape.vertices * unit, bind_positions=shape.bind_positions * unit)
-
-
-def save(
-    motion: Motion,
-    path: str | Path,
-    *,
-    force: bool = False,
-    unit: str | float | None = None,
-    up: str | None = None,
-    order: str | None = None,
-    shape: Shape | None = None,
-) -> None:
-    """Write a motion as .bvh, as .amc with its .asf beside it, or as .usd, .usda or .usdc.
-
-    Args:
-        motion: In metres, Y up.
-        path: The file.
-        force: Overwrite existing files.
-        unit: Metres per file unit, or one of m, cm, mm, inch, cmu; by default ``motion.space.unit``. USD is
-            always written in metres, which it says.
-        up: Up axis of the file; by default ``motion.space.up``. AMC and USD are always written Y up.
-        order: Euler order of a BVH, e.g. "ZYX"; by default ``motion.space.order``, the source's.
-        shape: A surface bound to the motion's joints, for USD.
-
-    Raises:
-        FormatError: Nothing was written; the message says why.
-    """
-    path = Path(path)
-    suffix = _check_suffix(path, OUTPUT_SUFFIXES, "motions, writing")
-    if suffix in USD_SUFFIXES:
-        if unit is not None or up is not None or order is not None:
-            raise FormatError(path, "USD is written in metres, Y up, with quaternions: no unit, up or order")
-        check_writable([path], force)
-        write_files({path: format_usd(motion, path, shape)}, force)
-        return
-    if shape is not None:
-        raise FormatError(path, f"a {suffix} file holds no surface; formats that do: {listed(USD_SUFFIXES)}")
-    space = motion.space
-    if unit is not None:
-        space = replace(space, unit=parse_unit(path, unit))
-    if up is not None:
-        space = replace(space, up=parse_up(path, up))
-    if suffix == ".amc":
-        if up is not None and space.up != "y":
-            raise FormatError(path, "AMC files are written Y up; for Z up write a .bvh")
-        space = replace(space, up="y")
-    targets = [path] if suffix == ".bvh" else [path, path.with_suffix(".asf")]
-    check_writable(targets, force)
-    try:
-        raw = leave_world(motion, space)
-        if suffix == ".bvh":
-            texts = [format_bvh(raw, path, order or motion.space.order)]
-        else:
-            bones = plan_bones(raw, path)
-            texts = [format_amc(raw, bones), format_asf(raw, bones)]
-    except SixpointError as error:
-        raise _with_path(path, error) from error
-    write_files(dict(zip(targets, (text.encode("utf-8", "replace") for text in texts), strict=True)), force)
-
-
-def load_targets(path: str | Path, *, rate: float | None = None) -> Targets:
-    """Read six-point targets from a .csv or .npz file.
-
-    Args:
-        path: The file; metres, Y up.
-        rate: Frames per second [Hz] in place of the file's.
-
-    Raises:
-        FormatError: The file cannot be read; the message has the line and what was expected there.
-    """
-    path = Path(path)
-    suffix = _check_suffix(path, TARGET_SUFFIXES, "targets")
-    _check_rate(path, rate)
-    return read_csv(path, rate) if suffix == ".csv" else read_npz(path, rate)
-
-
-def save_targets(targets: Targets, path: str | Path, force: bool = False) -> None:
-    """Write six-point targets as .csv or .npz.
-
-    Args:
-        targets: In metres, Y up.
-        path: The file.
-        force: Overwrite an existing file.
-
-    Raises:
-        FormatError: Nothing was written; the message says why.
-    """
-    path = Path(path)
-    suffix = _check_suffix(path, TARGET_SUFFIXES, "targets")
-    check_writable([path], force)
-    data = format_csv(targets).encode() if suffix == ".csv" else format_npz(targets)
-    write_files({path: data}, force)
-
-
-def _check_suffix(path: Path, known: tuple[str, ...], what: str) -> str:
-    suffix = path.suffix.lower()
-    if suffix in known:
-        return suffix
-    formats = f"formats of {what}: {listed(known)}"
-    if suffix == ".fbx":
-        raise FormatError(path, _FBX)
-    if suffix in _NOT_YET:
-        raise FormatError(path, f"{suffix} files are planned but not supported yet; {formats}")
-    if suffix == ".asf":
-        raise FormatError(path, "save as .amc: the .asf is written beside it")
-    if suffix in MARKER_SUFFIXES and suffix not in TARGET_SUFFIXES:
-        message = f"a {suffix} file holds markers, not {what.split(',')[0]}; follow them with: sixpoint track"
-        raise FormatError(path, f"{message}; {formats}")
-    if suffix in (*MOTION_SUFFIXES, *TARGET_SUFFIXES):
-        raise FormatError(path, f"a {suffix} file does not hold {what.split(',')[0]}; {formats}")
-    raise FormatError(path, f"unknown suffix {suffix!r}; {formats}")
-
-
-def _check_rate(path: Path, rate: float | None) -> None:
-    if rate is not None and not 1e-3 <= rate <= 1e6:
-        raise FormatError(path, f"the rate is frames per second, 0.001 to 1000000, got {rate}")
-
-
-def _with_path(path: Path, error: SixpointError) -> FormatError:
-    return error if isinstance(error, FormatError) else FormatError(path, str(error))

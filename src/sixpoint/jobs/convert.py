@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from sixpoint.body.figure import Figure
 from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
 from sixpoint.body.markers import Markers
 from sixpoint.body.motion import Motion
@@ -15,15 +14,17 @@ from sixpoint.formats import (
     ANGLE_SUFFIXES,
     MARKER_OUTPUTS,
     OUTPUT_SUFFIXES,
+    SHAPE_OUTPUTS,
+    SHAPE_SUFFIXES,
     TARGET_SUFFIXES,
     holds_markers,
+    load_avatar,
     load_shape,
     save,
     save_angles,
     save_markers,
     save_targets,
 )
-from sixpoint.formats.usd import USD_SUFFIXES
 from sixpoint.jobs.reading import Reading, is_targets, open_markers, open_motion, open_targets
 from sixpoint.jobs.writing import check_output, keep_sources
 from sixpoint.signals.gaps import fill_gaps
@@ -115,9 +116,11 @@ def convert(
         opened = open_motion(source, reading)
         keep_sources(files, [source, opened.skeleton])
         content = opened.motion
-        surfaces = {source.suffix.lower(), out.suffix.lower()} <= set(USD_SUFFIXES)
+        keeps = opened.avatar is not None and suffix in (".glb", ".vrma")
+        avatar = load_avatar(source, mapping) if keeps else None  # its meshes, or its humanoid map
+        surfaces = avatar is None and source.suffix.lower() in SHAPE_SUFFIXES and suffix in SHAPE_OUTPUTS
         shape = load_shape(source) if surfaces else None
-        save(content, out, force=force, unit=out_unit, up=out_up, shape=shape)
+        save(content, out, force=force, unit=out_unit, up=out_up, avatar=avatar, shape=shape)
     return Conversion(content, files)
 
 
@@ -130,7 +133,7 @@ def _convert_to_angles(
         raise FormatError(source, "six points hold no body; pose one with: sixpoint reconstruct")
     keep_sources([out], [source, reading.skeleton, mapping])
     opened = open_motion(source, reading)
-    content = compute_joint_angles(opened.motion, Figure.from_motion(opened.whole, mapping))
+    content = compute_joint_angles(opened.motion, opened.find_figure(mapping))
     save_angles(content, out, force=force)
     return Conversion(content, [out])
 
@@ -182,5 +185,5 @@ def _read_points(
     if from_targets:
         return open_targets(source, reading)
     opened = open_motion(source, reading)
-    points = Figure.from_motion(opened.whole, mapping).targets(opened.motion)
+    points = opened.find_figure(mapping).targets(opened.motion)
     return points if rotations else replace(points, rotations=None)

@@ -166,13 +166,14 @@ def decode_integers(data: bytes, processor: int) -> NDArray[np.int16]:
 
 def decode_floats(data: bytes, processor: int) -> Array:
     """32-bit floats of one of the three processors, as doubles; what is no number is NaN."""
-    if processor == SGI:
-        return np.frombuffer(data, ">f4").astype(np.float64)
-    if processor == INTEL:
-        return np.frombuffer(data, "<f4").astype(np.float64)
-    # VAX F-floats are IEEE floats times four with the two words exchanged.
-    words = np.frombuffer(data, "<u2").reshape(-1, 2)[:, ::-1].astype("<u2")
-    return np.frombuffer(words.tobytes(), "<f4").astype(np.float64) / 4.0
+    with np.errstate(invalid="ignore"):  # damaged files hold signalling NaNs
+        if processor == SGI:
+            return np.frombuffer(data, ">f4").astype(np.float64)
+        if processor == INTEL:
+            return np.frombuffer(data, "<f4").astype(np.float64)
+        # VAX F-floats are IEEE floats times four with the two words exchanged.
+        words = np.frombuffer(data, "<u2").reshape(-1, 2)[:, ::-1].astype("<u2")
+        return np.frombuffer(words.tobytes(), "<f4").astype(np.float64) / 4.0
 
 
 def numbers(parameters: Parameters, group: str, name: str) -> list[float]:

@@ -1,0 +1,273 @@
+"""Avatars as they are read: skeleton, sides, facing, skin, colours, movement."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation, Slerp
+
+from conftest import recordings
+from gltf_avatars import BONES, NAMES, PLACES, STYLES, Style, body_mesh, make_avatar
+from gltf_independent import Scene
+from sixpoint.body import rotations as rot
+from sixpoint.formats import load, load_avatar
+from sixpoint.formats.gltf.avatar import Avatar
+
+LEFT, RIGHT = 0, 1
+POSE = Rotation.from_euler("xyz", np.random.default_rng(5).normal(0, 0.3, (len(BONES), 3))).as_quat()
+"""Nodes turned away from the bind pose, as in a file that was saved in the middle of a movement."""
+
+
+def put(folder: Path, style: Style | str, name: str = "avatar") -> Path:
+    """Write an avatar; its file."""
+    style = STYLES[style] if isinstance(style, str) else style
+    path = folder / (name + (".glb" if style.vrm is None else ".vrm"))
+    path.write_bytes(make_avatar(style))
+    return path
+
+
+def joints(avatar: Avatar) -> list[int]:
+    """The joint of each bone of the table; its nodes follow the armature's."""
+    return [avatar.rig.nodes.index(k + 1) for k in range(len(BONES))]
+
+
+def at_rest(avatar: Avatar) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and world rotations in the reference pose."""
+    skeleton = avatar.figure.skeleton
+    return skeleton.compute_transforms(np.tile(rot.IDENTITY, (len(skeleton), 1)))
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_every_style_of_file_is_the_same_body(name, tmp_path):
+    """Whatever turns, scales and names a file uses, joints are where the table has them: Y up, facing +Z."""
+    avatar = load_avatar(put(tmp_path, name))
+    np.testing.assert_allclose(at_rest(avatar)[0][joints(avatar)], PLACES, atol=1e-6)
+    np.testing.assert_allclose(avatar.read_motion().positions[0][joints(avatar)], PLACES, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_left_is_left_and_forward_is_forward(name, tmp_path):
+    """Roles are on the bones of the table, whether told by map, names or structure; toes point to +Z."""
+    avatar = load_avatar(put(tmp_path, name))
+    row, roles = joints(avatar), avatar.figure.roles
+    for role, bone in (
+        ("shoulder", "UpperArm"),
+        ("elbow", "LowerArm"),
+        ("wrist", "Hand"),
+        ("hip", "UpperLeg"),
+    ):
+        assert getattr(roles, role) == tuple(row[NAMES.index(side + bone)] for side in ("left", "right"))
+    assert (roles.pelvis, roles.head) == (row[NAMES.index("hips")], row[NAMES.index("head")])
+    rest = avatar.figure.rest_positions
+    assert rest[roles.wrist[LEFT], 0] > 0.1 > -0.1 > rest[roles.wrist[RIGHT], 0]
+    assert rest[roles.wrist[LEFT], 1] < rest[roles.elbow[LEFT], 1] < rest[roles.shoulder[LEFT], 1]
+    toes = row[NAMES.index("leftToes")]
+    assert rest[toes, 2] - rest[roles.ankle[LEFT], 2] > 0.1
+
+
+@pytest.mark.parametrize("name", [n for n in STYLES if n != "bones"])
+def test_the_shape_is_the_files_mesh(name, tmp_path):
+    """In the pose of the nodes the skinned vertices are those that the file's matrices give."""
+    path = put(tmp_path, name)
+    avatar = load_avatar(path)
+    motion = avatar.read_motion()
+    shape = avatar.figure.shape
+    ours = shape.place(motion.positions[0], motion.transforms[1][0])[shape.triangles]
+    turn = np.array([-1.0, 1.0, -1.0]) if name == "vrm0" else np.ones(3)
+    theirs = Scene(path.read_bytes()).vertices_at(0.0) * turn
+    assert theirs.shape == ours.shape
+    np.testing.assert_allclose(np.sort(theirs.reshape(-1, 3), 0), np.sort(ours.reshape(-1, 3), 0), atol=1e-5)
+    # Outside is outside: the volume that the triangles enclose is positive.
+    assert np.einsum("ti,ti", ours[:, 0], np.cross(ours[:, 1], ours[:, 2])) > 0
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+@pytest.mark.parametrize("z_up", [False, True])
+def test_the_pose_of_the_nodes_need_not_be_the_bind_pose(scale, z_up, tmp_path):
+    """A file saved in another pose has its bind pose as reference, and its vertices are where it has them."""
+    path = put(tmp_path, Style(turned=True, pose=POSE, z_up=z_up, scale=scale))
+    avatar = load_avatar(path)
+    np.testing.assert_allclose(at_rest(avatar)[0][joints(avatar)], PLACES, atol=1e-5)
+    motion, shape = avatar.read_motion(), avatar.figure.shape
+    ours = shape.place(motion.positions[0], motion.transforms[1][0])[shape.triangles]
+    np.testing.assert_allclose(ours, Scene(path.read_bytes()).vertices_at(0.0), atol=1e-5)
+    assert not np.allclose(ours, body_mesh(list(range(len(BONES))))[0][shape.triangles], atol=0.05)
+
+
+def test_trimesh_sees_the_same_mesh(tmp_path):
+    """An independent reader finds the same vertices and triangles in the bind pose."""
+    path = put(tmp_path, "vrm1")
+    shape = load_avatar(path).figure.shape
+    scene = trimesh.load(path, file_type="glb", process=False)
+    theirs = np.concatenate([mesh.triangles for mesh in scene.geometry.values()])
+    ours = shape.vertices[shape.triangles]
+    np.testing.assert_allclose(np.sort(theirs.reshape(-1, 3), 0), np.sort(ours.reshape(-1, 3), 0), atol=1e-6)
+
+
+def test_colours_are_factor_times_texture_in_linear_light(tmp_path):
+    """Red left half, blue right half, times (0.5, 0.5, 1)."""
+    avatar = load_avatar(put(tmp_path, "vrm1"))
+    left = avatar.figure.shape.vertices[:, 0] > 1e-6
+    right = avatar.figure.shape.vertices[:, 0] < -1e-6
+    np.testing.assert_allclose(
+        avatar.appearance.colours[left], [[0.5, 0.0, 0.0, 1.0]] * left.sum(), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        avatar.appearance.colours[right], [[0.0, 0.0, 1.0, 1.0]] * right.sum(), atol=1e-6
+    )
+
+
+def test_a_picture_that_cannot_be_decoded_is_said(tmp_path):
+    """The mesh stays, white times its factor."""
+
+    def spoil(builder: Any, nodes: dict[str, int]) -> None:
+        builder.content["images"][0]["bufferView"] = builder.add_view(b"no picture at all...")
+
+    avatar = load_avatar(put(tmp_path, Style(more=spoil)))
+    with pytest.warns(UserWarning, match=r"images\[0\] cannot be decoded"):
+        colours = avatar.appearance.colours
+    np.testing.assert_allclose(colours, [[0.5, 0.5, 1.0, 1.0]] * len(colours))
+
+
+def test_a_gltf_with_files_beside_it_is_the_same(tmp_path):
+    """JSON with an external buffer, and JSON with a data URI, read as the GLB does."""
+    data = make_avatar("vrm1")
+    scene = Scene(data)
+    (tmp_path / "some data.bin").write_bytes(scene.binary)
+    uris = {"external": "some%20data.bin"}
+    uris["inline"] = "data:application/octet-stream;base64," + base64.b64encode(scene.binary).decode()
+    whole = load_avatar(put(tmp_path, "vrm1"))
+    for name, uri in uris.items():
+        content = scene.json | {"buffers": [{"byteLength": len(scene.binary), "uri": uri}]}
+        path = tmp_path / f"{name}.gltf"
+        path.write_text(json.dumps(content))
+        avatar = load_avatar(path)
+        np.testing.assert_array_equal(avatar.figure.shape.vertices, whole.figure.shape.vertices)
+        np.testing.assert_array_equal(avatar.appearance.colours, whole.appearance.colours)
+        assert avatar.figure.roles == whole.figure.roles
+
+
+# --- movement ------------------------------------------------------------------------------------
+
+
+def animated(
+    times: list[float], values: np.ndarray, path: str, interpolation: str, bone: str = "leftUpperArm"
+) -> Any:
+    """A change to a document: an animation of one property of one bone."""
+
+    def add(builder: Any, nodes: dict[str, int]) -> None:
+        sampler = {"input": builder.add_accessor(times, bounds=True), "output": builder.add_accessor(values)}
+        target = {"node": nodes[bone], "path": path}
+        animation = {"samplers": [sampler | {"interpolation": interpolation}]}
+        builder.add("animations", animation | {"channels": [{"sampler": 0, "target": target}]})
+
+    return add
+
+
+TIMES = [0.1, 0.3, 0.65, 1.1]
+TURNS = Rotation.random(4, random_state=8)
+
+
+def test_linear_rotations_are_spherical(tmp_path):
+    """As SciPy's Slerp, also where a key has the other sign."""
+    keys = TURNS.as_quat() * [[1], [-1], [1], [-1]]
+    motion = load(put(tmp_path, Style(more=animated(TIMES, keys, "rotation", "LINEAR"))))
+    assert motion.rate == 60.0  # the keys are on no grid
+    times = np.minimum(TIMES[0] + np.arange(len(motion)) / 60.0, TIMES[-1])
+    expected = Slerp(np.float32(TIMES), TURNS)(np.maximum(times, np.float32(TIMES[0])))
+    ours = Rotation.from_quat(motion.rotations[:, motion.skeleton.index("leftUpperArm")])
+    assert (expected.inv() * ours).magnitude().max() < 1e-5
+
+
+def test_step_keys_hold(tmp_path):
+    """Each key holds until the next."""
+    motion = load(put(tmp_path, Style(more=animated(TIMES, TURNS.as_quat(), "rotation", "STEP"))))
+    times = TIMES[0] + np.arange(len(motion)) / 60.0
+    key = np.searchsorted(TIMES, times + 1e-6, side="right") - 1
+    ours = Rotation.from_quat(motion.rotations[:, motion.skeleton.index("leftUpperArm")])
+    assert (TURNS[key].inv() * ours).magnitude().max() < 1e-5
+
+
+def test_cubic_splines_are_hermite(tmp_path):
+    """As SciPy's cubic Hermite spline."""
+    rng = np.random.default_rng(2)
+    values = rng.normal(0, 0.2, (4, 3, 3)) + [0, 1, 0]
+    more = animated(TIMES, values.reshape(-1, 3), "translation", "CUBICSPLINE", "hips")
+    motion = load(put(tmp_path, Style(more=more)))
+    times = np.clip(TIMES[0] + np.arange(len(motion)) / 60.0, *np.float32([TIMES[0], TIMES[-1]]))
+    # Between keys only: arriving and leaving tangents differ.
+    for k in range(3):
+        inside = (times >= TIMES[k]) & (times < TIMES[k + 1])
+        ends = [k, k + 1]
+        spline = CubicHermiteSpline(
+            np.float32(TIMES)[ends], values[ends, 1], [values[k, 2], values[k + 1, 0]]
+        )
+        np.testing.assert_allclose(motion.root_positions[inside], spline(times[inside]), atol=1e-5)
+
+
+@pytest.mark.parametrize("rate", [24.0, 29.97, 30.0, 120.0])
+def test_even_keys_tell_the_rate(rate, tmp_path):
+    """Keys on a grid are read as they are, at their own rate, wherever they begin."""
+    times = (np.arange(200) + 7) / rate
+    turns = Rotation.random(200, random_state=1)
+    motion = load(put(tmp_path, Style(more=animated(times, turns.as_quat(), "rotation", "LINEAR"))))
+    assert motion.rate == pytest.approx(rate, rel=1e-6)
+    assert len(motion) == 200
+    ours = Rotation.from_quat(motion.rotations[:, motion.skeleton.index("leftUpperArm")])
+    assert (turns.inv() * ours).magnitude().max() < 1e-6
+    assert len(load(tmp_path / "avatar.glb", rate=10.0)) == int(199 / rate * 10) + 1
+
+
+def test_a_node_above_the_skeleton_that_moves_is_part_of_it(tmp_path):
+    """Root motion on the armature's node is not lost."""
+    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 2.0]])
+
+    def add(builder: Any, nodes: dict[str, int]) -> None:
+        animated([0.0, 1.0], places, "translation", "LINEAR")(builder, nodes)
+        builder.content["animations"][0]["channels"][0]["target"]["node"] = 0
+
+    motion = load(put(tmp_path, Style(more=add)))
+    assert motion.skeleton.names[0] == "Armature"
+    np.testing.assert_allclose(motion.root_positions, places, atol=1e-6)
+
+
+def test_scales_that_move_are_said(tmp_path):
+    """A Motion cannot hold them."""
+    path = put(
+        tmp_path, Style(more=animated([0.0, 1.0], np.array([[1, 1, 1], [1, 2, 1]]), "scale", "LINEAR"))
+    )
+    with pytest.warns(UserWarning, match="animation scales 1 nodes"):
+        load(path)
+
+
+# --- characters of others ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", recordings("mesh/*"))
+def test_characters_of_others(path, data):
+    """Sides, facing and proportions are plausible, and the mesh is where the file's matrices have it."""
+    avatar = load_avatar(path)
+    figure = avatar.figure
+    rest, r = figure.rest_positions, figure.roles
+    for pair in (r.shoulder, r.elbow, r.wrist, r.hip, r.knee, r.ankle):
+        assert rest[pair[LEFT], 0] > rest[pair[RIGHT], 0]
+    assert rest[r.head, 1] > rest[r.pelvis, 1] > rest[r.knee[0], 1] > rest[r.ankle[0], 1]
+    resting = at_rest(avatar)[0]
+    across = resting[r.hip[LEFT]] - resting[r.hip[RIGHT]]
+    assert across[0] > 0.9 * np.linalg.norm(across)  # the file's own rest pose faces +Z
+    for upper, lower in ((figure.offset_between(a, b), figure.offset_between(b, c)) for a, b, c in r.limbs):
+        assert 0.4 < np.linalg.norm(upper) / np.linalg.norm(lower) < 2.5
+    assert 0.3 < figure.height < 3.0
+    motion, shape = avatar.read_motion(), figure.shape
+    if shape is not None:
+        ours = shape.place(motion.positions[0], motion.transforms[1][0])
+        assert np.ptp(ours[:, 1]) > 0.8 * figure.height
+        assert avatar.appearance.colours.shape == (len(ours), 4)
+    assert motion.skeleton.names == figure.skeleton.names
