@@ -16,13 +16,13 @@ import sixpoint as sp
 from body_rigs import load, real_rigs
 from live_peers import peer_bundle, turned_pose
 from sixpoint.body import rotations as rot
+from sixpoint.body.human_bones import HUMAN_BONES, find_bones
 from sixpoint.errors import OscError
 from sixpoint.live import osc, vmc
 from sixpoint.live.osc import Bundle, make_message
 from sixpoint.live.osc_write import encode
 from sixpoint.live.readings import LOST, NO_ROTATION, Reading
 from sixpoint.live.unity import mirror_position, mirror_rotation
-from sixpoint.body.human_bones import HUMAN_BONES, find_bones
 from sixpoint.live.vmc_write import PerformerWriter, write_devices
 
 RIGS = [pytest.param(p, id=p.name) for p in real_rigs()] or [
