@@ -18,6 +18,7 @@ from gltf_avatars import BONES, NAMES, PLACES, STYLES, Style, body_mesh, make_av
 from gltf_independent import Scene
 from sixpoint.body import rotations as rot
 from sixpoint.formats import load, load_avatar
+from sixpoint.formats.gltf.animation import Channel, find_grid
 from sixpoint.formats.gltf.avatar import Avatar
 
 LEFT, RIGHT = 0, 1
@@ -316,6 +317,20 @@ def test_even_keys_tell_the_rate(rate, tmp_path):
     ours = Rotation.from_quat(motion.rotations[:, motion.skeleton.index("leftUpperArm")])
     assert (turns.inv() * ours).magnitude().max() < 1e-6
     assert len(load(tmp_path / "avatar.glb", rate=10.0)) == int(199 / rate * 10) + 1
+
+
+def test_long_and_sparse_recordings_keep_their_rate(tmp_path):
+    """An hour at 120 Hz, which single precision tells to a fortieth of a frame; keys on a few frames."""
+    document = load_avatar(put(tmp_path, Style(mesh="none"))).document
+    keys = (np.arange(432_000) / 120.0).astype(np.float32).astype(float)
+    hour = Channel(1, "translation", keys, np.zeros((len(keys), 3)), "LINEAR")
+    times, rate = find_grid(document, [hour], None, 1)
+    assert rate == 120.0
+    np.testing.assert_array_equal(times, keys)
+    frames = np.array([0, 1, 2, 3, 7, 8, 9, 20])
+    turns = Rotation.random(8, random_state=2).as_quat()
+    motion = load(put(tmp_path, Style(more=animated(frames / 24.0, turns, "rotation", "LINEAR"))))
+    assert (motion.rate, len(motion)) == (24.0, 21)
 
 
 def test_a_node_above_the_skeleton_that_moves_is_part_of_it(tmp_path):
