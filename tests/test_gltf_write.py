@@ -333,7 +333,7 @@ def test_what_exporters_get_wrong_is_put_right(tmp_path, boxing):
     np.testing.assert_allclose(shape.place(*places), again.place(*places), atol=CLOSE)
 
 
-@pytest.mark.parametrize("path", recordings("mesh/*"))
+@pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_characters_of_others_are_driven(path, data, tmp_path):
     """The paper's boxing clip moves them; their file gives the motion back."""
     clip = load(data / "paper" / "17_10.amc").sliced(slice(0, 600, 2))

@@ -103,10 +103,8 @@ class Avatar:
             off = np.abs(other.offsets[1:] - mine.offsets[1:]).max(axis=1, initial=0.0)
             if np.all(off < SAME_BONES * self.figure.height):
                 return
-            longest = int(np.argmax(off)) + 1
-            what = (
-                f"than the avatar {self.name!r}, which shares its names: {mine.names[longest]!r} is elsewhere"
-            )
+            joint = mine.names[int(np.argmax(off)) + 1]
+            what = f"than the avatar {self.name!r}, which shares its names: {joint!r} is elsewhere"
         raise FigureError(
             f"the motion is on another skeleton {what}; pose the avatar's figure from the motion's six points"
         )
