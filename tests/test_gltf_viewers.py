@@ -149,7 +149,7 @@ def test_the_validator_finds_no_error_in_what_we_write(tmp_path, boxing):
     assert errors([*files, tmp_path / "one_frame.glb"]) == {}
 
 
-@pytest.mark.parametrize("path", recordings("mesh/*"))
+@pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_the_validator_finds_no_error_in_driven_characters(path, data, tmp_path):
     """Characters of others, driven by the paper's boxing clip, are valid when they are written."""
     clip = load(data / "paper" / "17_10.amc").sliced(slice(0, 240))
@@ -242,4 +242,4 @@ def test_three_vrm_plays_our_animations_on_an_avatar(name, viewer, boxing):
     for k, bones in zip(FRAMES, acted, strict=True):
         for bone in ("hips", "head", "leftHand", "rightHand", "leftFoot", "rightFoot", "leftLowerArm"):
             joint = avatar.rig.nodes.index(avatar.humanoid.bones[bone])
-            np.testing.assert_allclose(np.array(bones[bone]) * turn, motion.positions[k, joint], atol=1e-3)
+            np.testing.assert_allclose(np.array(bones[bone]) * turn, motion.positions[k, joint], atol=1e-4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +157,22 @@ def test_pictures_beside_the_file_come_into_it(tmp_path, boxing):
     assert not (tmp_path / "lost.glb").exists()
 
 
+def test_what_is_not_known_is_kept_whole(tmp_path):
+    """With an extension that may refer to any data, nothing is taken out and no index changes."""
+
+    def unknown(builder: Any, nodes: dict[str, int]) -> None:
+        builder.content["extensionsUsed"] = ["ACME_data"]
+        builder.content["extensions"] = {"ACME_data": {"bufferView": builder.add_view(b"important data!!")}}
+
+    avatar = put(tmp_path, "unknown", Style(more=unknown))
+    motion = wild(avatar)
+    save(motion, tmp_path / "out.glb", avatar=avatar)
+    same(load(tmp_path / "out.glb"), motion)
+    scene = Scene((tmp_path / "out.glb").read_bytes())
+    view = scene.json["bufferViews"][scene.json["extensions"]["ACME_data"]["bufferView"]]
+    assert scene.binary[view["byteOffset"] :][: view["byteLength"]] == b"important data!!"
+
+
 def test_several_roots_get_one_that_can_move(tmp_path):
     """A body whose file has two trees (legs and trunk) keeps its movement."""
 
@@ -266,6 +283,9 @@ def test_wrong_requests_say_what_to_do(tmp_path, boxing):
     out = tmp_path / "out.glb"
     with pytest.raises(FormatError, match=r"another skeleton \(34 joints\).*'vrm1' \(21\)"):
         save(other, out, avatar=avatar)
+    stretched = replace(motion.skeleton, offsets=motion.skeleton.offsets * 1.1)
+    with pytest.raises(FormatError, match=r"shares its names: 'left.*Leg' is elsewhere"):
+        save(replace(motion, skeleton=stretched), out, avatar=avatar)
     with pytest.raises(FormatError, match="34 joints"):
         save(other, tmp_path / "out.vrma", avatar=avatar)
     with pytest.raises(FormatError, match="bound to 21 joints, the motion has 34"):
@@ -313,7 +333,7 @@ def test_what_exporters_get_wrong_is_put_right(tmp_path, boxing):
     np.testing.assert_allclose(shape.place(*places), again.place(*places), atol=CLOSE)
 
 
-@pytest.mark.parametrize("path", recordings("mesh/*"))
+@pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_characters_of_others_are_driven(path, data, tmp_path):
     """The paper's boxing clip moves them; their file gives the motion back."""
     clip = load(data / "paper" / "17_10.amc").sliced(slice(0, 600, 2))

@@ -26,6 +26,7 @@ FASTEST = 1000.0
 MOST_FRAMES = 1_000_000
 MOST_NUMBERS = 200_000_000
 OFF_GRID = 0.02  # of a frame: keys nearer to the grid than this lie on it
+SAME_TIME = 1e-5  # [s]
 TYPES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 
 
@@ -137,6 +138,7 @@ def find_grid(
         FormatError: There would be too many frames.
     """
     keys = np.unique(np.concatenate([c.times for c in channels]))
+    keys = keys[np.diff(keys, prepend=-np.inf) > SAME_TIME]
     start, length = keys[0], keys[-1] - keys[0]
     found = _even_rate(keys)
     even = found is not None and rate in (None, found)
@@ -146,25 +148,29 @@ def find_grid(
         raise document.error(f"the animation is {length:g} s long: {frames:.0f} frames are too many")
     times = start + np.arange(round(length * rate) + 1 if even else int(length * rate + 1e-6) + 1) / rate
     nearest = keys[np.clip(np.searchsorted(keys, times - 0.5 / rate), 0, len(keys) - 1)]
-    on_key = np.abs(nearest - times) < OFF_GRID / rate  # times are single precision: meet the keys themselves
+    on_key = np.abs(nearest - times) * rate < _slack(keys, rate)  # not between keys that are meant to be met
     return np.where(on_key, nearest, times), rate
+
+
+def _slack(keys: Array, rate: float) -> float:
+    """How far keys may lie from their grid, in frames: times are in single precision."""
+    return OFF_GRID + float(np.abs(keys).max()) * rate * 2.0**-22
 
 
 def _even_rate(keys: Array) -> float | None:
     """Frames per second of keys on an even grid; None where they lie on none."""
     if len(keys) < 2:
         return None
-    step = float(np.median(np.diff(keys)))
     length = float(keys[-1] - keys[0])
-    count = round(length / step)
-    if not 1 <= count <= MOST_FRAMES:
-        return None
-    place = (keys - keys[0]) * (count / length)
-    rate = count / length
-    if np.abs(place - np.round(place)).max() > OFF_GRID or not 1.0 / FASTEST < rate <= FASTEST:
-        return None
-    whole = max(round(rate), 1)
-    return float(whole) if abs(rate - whole) < 1e-4 * rate else rate
+    sparse = round(min(length / float(np.median(np.diff(keys))), MOST_FRAMES))
+    for count in (len(keys) - 1, sparse):  # on every frame, else on some
+        place, rate = (keys - keys[0]) * (count / length), count / length
+        slack = min(_slack(keys, rate), 0.4)
+        if 1.0 / FASTEST < rate <= FASTEST and np.abs(place - np.round(place)).max() <= slack:
+            whole = max(round(rate), 1)
+            near = abs(rate - whole) < 1e-4 * rate and abs(count - whole * length) <= slack
+            return float(whole) if near else rate
+    return None
 
 
 def warn_of_scales(document: Document, channels: list[Channel], scales: Array) -> None:

@@ -108,7 +108,7 @@ def read_image(document: Document, index: int) -> tuple[bytes, str]:
         data = bytes(document.buffer(view["buffer"])[start : start + view["byteLength"]])
         if len(data) < view["byteLength"]:
             raise document.error(f"{where} reaches beyond its buffer")
-    elif "uri" in image:
+    elif image.get("uri"):
         data = document.read_uri(image["uri"], where)
     else:
         raise document.error(f"{where} has neither a uri nor a bufferView")

@@ -35,6 +35,8 @@ from sixpoint.formats.gltf.rig import HALF_TURN, Rig, build_rig, choose_joints
 Array = NDArray[np.float64]
 
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm", ".vrma")
+SAME_BONES = 1e-3
+"""Part of a body's height within which its bones are the same."""
 STILL = 1e-5
 """Part of the body's size within which a joint keeps its offset."""
 SPACE = FileSpace(1.0, "y", "convention", "convention")
@@ -94,11 +96,18 @@ class Avatar:
             FigureError: Saying what to do.
         """
         mine, other = self.figure.skeleton, motion.skeleton
-        if other is not mine and other.names != mine.names:
-            raise FigureError(
-                f"the motion is on another skeleton ({len(other)} joints) than the avatar {self.name!r} "
-                f"({len(mine)}): pose the avatar's figure from the motion's six points"
-            )
+        if other is mine:
+            return
+        what = f"({len(other)} joints) than the avatar {self.name!r} ({len(mine)})"
+        if other.names == mine.names and np.array_equal(other.parents, mine.parents):
+            off = np.abs(other.offsets[1:] - mine.offsets[1:]).max(axis=1, initial=0.0)
+            if np.all(off < SAME_BONES * self.figure.height):
+                return
+            joint = mine.names[int(np.argmax(off)) + 1]
+            what = f"than the avatar {self.name!r}, which shares its names: {joint!r} is elsewhere"
+        raise FigureError(
+            f"the motion is on another skeleton {what}; pose the avatar's figure from the motion's six points"
+        )
 
     def read_motion(self, rate: float | None = None) -> Motion:
         """The first animation, or one frame of the pose that the nodes have where there is none.

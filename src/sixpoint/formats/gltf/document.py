@@ -83,7 +83,7 @@ class Document:
     def _read_buffer(self, index: int) -> memoryview:
         buffer = self.items("buffers")[index]
         where = f"buffers[{index}]"
-        if "uri" in buffer:
+        if buffer.get("uri"):
             data = memoryview(self.read_uri(buffer["uri"], where))
         elif index == 0 and len(self.binary):
             data = self.binary

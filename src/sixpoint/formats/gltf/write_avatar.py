@@ -114,9 +114,8 @@ def _copy(document: Document, tree: NodeTree) -> Builder:
     for owner, key in slots:
         owner[key] = renumbered[owner[key]]
     for index, image in enumerate(content.get("images", [])):
-        if "uri" in image:
+        if image.pop("uri", "") and "bufferView" not in image:
             picture, kind = read_image(document, index)
-            image.pop("uri")
             image |= {"bufferView": builder.add_view(picture), "mimeType": kind}
     apply_repairs(builder, repairs)
     return builder

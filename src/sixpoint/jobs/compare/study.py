@@ -21,6 +21,10 @@ from sixpoint.study.comparison.claims import CLAIMS
 from sixpoint.study.comparison.model import SPLITS, Reference
 
 MOTIONS = tuple(suffix for suffix in MOTION_SUFFIXES if suffix != ".asf")
+RECORDINGS = (
+    ".bvh",
+    ".amc",
+)  # what a folder is searched for: a .glb there may be a character that stands still
 CLIP_KEYS = (
     *("name", "file", "files", "skeleton", "frames", "weights", "sample", "window", "mapping", "note"),
     *("person", "split"),
@@ -225,9 +229,9 @@ def study_of_files(
 
 
 def _motions_in(folder: Path) -> list[Path]:
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MOTIONS and p.is_file())
+    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in RECORDINGS and p.is_file())
     if not found:
-        raise FormatError(folder, f"no motions in this folder; formats: {listed(MOTIONS)}")
+        raise FormatError(folder, f"no motions in this folder; formats: {listed(RECORDINGS)}")
     if len(found) > TOO_MANY:
         raise FormatError(folder, f"{len(found)} motions are below this folder; give fewer, one by one")
     return found
