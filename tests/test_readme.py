@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import sixpoint as sp
+from gltf_avatars import make_avatar
+from marker_bodies import walking_markers
 from sixpoint.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -64,7 +66,11 @@ def test_commands_run(command, tmp_path, monkeypatch, capsys):
     sp.save_targets(figure.targets(motion), "points.csv")
     if "convert" not in command:
         sp.save(motion, "take.bvh")
+    Path("hero.vrm").write_bytes(make_avatar("vrm1"))
+    sp.save_markers(walking_markers(), "gait.c3d")
     words = shlex.split(command)[1:]
+    if words[0] == "render":
+        words += ["--size", "80x96", "--fps", "5"]
     if words[0] == "live":
         words += ["--duration", "0.2"]  # it runs until it is stopped
         words[words.index("--vmc-in") + 1] = "0"  # a free port

@@ -10,16 +10,34 @@
 Metres, radians, seconds; Y up, Z forward, X to the figure's left; quaternions are xyzw.
 """
 
+from sixpoint.body.appearance import Appearance
 from sixpoint.body.dofs import Ball, Dofs, Fixed, Hinges, SwingTwist
 from sixpoint.body.figure import Figure
+from sixpoint.body.flesh import build_shape
+from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
 from sixpoint.body.limits import Limits
+from sixpoint.body.marker_roles import MarkerRoles, find_marker_roles
+from sixpoint.body.markers import Event, Markers
 from sixpoint.body.motion import Motion, Pose
+from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.calibrate import calibrate
 from sixpoint.calibration.mounts import Calibration, Mount
 from sixpoint.errors import FigureError, FormatError, SixpointError, SkeletonError, TargetError
-from sixpoint.formats import load, load_targets, save, save_targets
+from sixpoint.formats import (
+    Avatar,
+    load,
+    load_avatar,
+    load_markers,
+    load_shape,
+    load_targets,
+    save,
+    save_angles,
+    save_markers,
+    save_targets,
+)
+from sixpoint.jobs.retarget import retarget
 from sixpoint.samples import SAMPLES, make_sample
 from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
 from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
@@ -62,6 +80,8 @@ __all__ = [
     "WALKING",
     "AlignTask",
     "AnalyticLimb",
+    "Appearance",
+    "Avatar",
     "BalanceTask",
     "Ball",
     "Box",
@@ -71,6 +91,7 @@ __all__ = [
     "CyclicCoordinateDescent",
     "Dofs",
     "Errors",
+    "Event",
     "Figure",
     "FigureError",
     "Fixed",
@@ -81,9 +102,12 @@ __all__ = [
     "Hinges",
     "HybridIK",
     "JacobianIK",
+    "JointAngles",
     "KulpaMultonArnaldi",
     "Limits",
     "LookAtTask",
+    "MarkerRoles",
+    "Markers",
     "Motion",
     "MotionSolution",
     "Mount",
@@ -97,6 +121,7 @@ __all__ = [
     "SequentialIK",
     "SequentialIKPlus",
     "SequentialIKPrior",
+    "Shape",
     "SixpointError",
     "Skeleton",
     "SkeletonError",
@@ -108,12 +133,21 @@ __all__ = [
     "TGBSequentialIK",
     "TargetError",
     "Targets",
+    "build_shape",
     "calibrate",
     "compute_errors",
+    "compute_joint_angles",
+    "find_marker_roles",
     "load",
+    "load_avatar",
+    "load_markers",
+    "load_shape",
     "load_targets",
     "make_sample",
     "make_solver",
+    "retarget",
     "save",
+    "save_angles",
+    "save_markers",
     "save_targets",
 ]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -33,6 +32,8 @@ class Loft:
 
 def sample(rows: Sequence[Sequence[float]], places: ArrayLike) -> Array:
     """Columns (n, c) of a table of sections at places (n,), by monotone cubics; constant beyond the ends."""
+    from scipy.interpolate import PchipInterpolator  # slow to import, and only surfaces need it
+
     table = np.asarray(rows, float)
     at = np.clip(np.asarray(places, float), table[0, 0], table[-1, 0])
     return np.asarray(PchipInterpolator(table[:, 0], table[:, 1:], axis=0)(at))
