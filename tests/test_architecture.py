@@ -52,7 +52,7 @@ LIBRARIES = {
     "solvers": {"numpy"},
     "study": {"numpy", "scipy", "matplotlib", "torch"},
     "viewer": {"numpy", "viser"},
-    "jobs": {"numpy", "viser"},
+    "jobs": {"numpy", "viser", "distributed"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
 """Room -> third-party libraries it may import."""
@@ -87,7 +87,17 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch", "viser"}:
+        elif parts[0] in {
+            "numpy",
+            "scipy",
+            "numba",
+            "matplotlib",
+            "cyclopts",
+            "rich",
+            "torch",
+            "viser",
+            "distributed",
+        }:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
+import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -50,7 +52,7 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
     try:
         for path, data in contents.items():
             target = path.resolve()
-            spare = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+            spare = target.with_name(f"{_spare_prefix(target)}{secrets.token_hex(6)}.tmp")
             temporary[target] = spare
             with spare.open("xb") as stream:
                 stream.write(data)
@@ -70,3 +72,29 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
             reason = getattr(error, "strerror", None) or str(error)
             raise FormatError(path, f"cannot be written: {reason}") from error
         raise
+
+
+def remove_leftovers(path: Path, age: float = 0.0) -> None:
+    """Delete temporary files of a target whose writer was killed.
+
+    Args:
+        path: The target.
+        age: How old they must be [s]: younger ones may be of another process that is writing.
+    """
+    prefix, oldest = _spare_prefix(path), time.time() - age
+    try:
+        spares = [
+            spare
+            for spare in path.parent.iterdir()
+            if spare.name.startswith(prefix) and re.fullmatch(r"[0-9a-f]{12}\.tmp", spare.name[len(prefix) :])
+        ]
+    except OSError:
+        return
+    for spare in spares:
+        with contextlib.suppress(OSError):
+            if spare.stat().st_mtime <= oldest:
+                spare.unlink()
+
+
+def _spare_prefix(target: Path) -> str:
+    return f".{target.name[:100]}."

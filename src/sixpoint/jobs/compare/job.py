@@ -203,7 +203,8 @@ def _gather(
     study: Study, rows: Sequence[Row], clips: _Clips, store: Store, progress: Progress, most: int | None
 ) -> Comparison:
     """The comparison as the report wants it, with pictures of the first ``most`` clips that can be read."""
-    drawn, notes = [], []
+    drawn: list[ClipRuns] = []
+    notes: list[str] = []
     for number, clip in enumerate(study.clips):
         progress("gathering", number, len(study.clips))
         if clip.note:

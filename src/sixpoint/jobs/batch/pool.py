@@ -1,0 +1,215 @@
+"""Tasks on several processes of this machine.
+
+Each process has one task at a time and a pipe of its own: when it dies (out of memory, a crash), the pipe
+says which task it had, and the others go on. A ``ProcessPoolExecutor`` would say only that one of all died.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from sixpoint.errors import SixpointError
+from sixpoint.jobs.batch.folder import sweep
+from sixpoint.jobs.batch.registry import find_job
+from sixpoint.jobs.batch.running import run_task, warm_up
+from sixpoint.jobs.batch.task import Outcome, Task
+
+TRIES = 2
+"""How often a task is begun whose worker died."""
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+"""Set to 1 for workers: there is a process for each core."""
+SPAWN = get_context("spawn")  # a fork would copy threads' locks
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """Asks a worker to compile what a job needs; it answers with the time [s], and may say things before."""
+
+    job: str
+    options: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Asks a worker to import what a job needs; it does not answer."""
+
+    job: str
+
+
+def serve(link: Connection) -> None:
+    """Do what is asked for until the pipe ends; the life of a worker."""
+    while True:
+        try:
+            asked = link.recv()
+            if isinstance(asked, Task):
+                link.send(run_task(asked))
+            elif isinstance(asked, WarmUp):
+                link.send(_warm_up(asked, link))
+            else:
+                find_job(asked.job).load()
+        except (EOFError, OSError):
+            return  # the parent is gone
+
+
+def _warm_up(asked: WarmUp, link: Connection) -> float | SixpointError:
+    try:
+        return warm_up(asked.job, asked.options, link.send)
+    except SixpointError as error:
+        return SixpointError(str(error))
+
+
+class Worker:
+    """A process, and what it was asked to do."""
+
+    def __init__(self) -> None:
+        self.link, other = SPAWN.Pipe()
+        self.process = SPAWN.Process(target=serve, args=(other,), daemon=True, name="sixpoint batch")
+        with _as_workers_begin():
+            self.process.start()
+        other.close()
+        self.task: Task | None = None
+
+    def ask(self, what: Task | WarmUp | Begin) -> None:
+        """Hand over something to do; what is wrong with the worker shows when it is to answer."""
+        self.task = what if isinstance(what, Task) else None
+        try:
+            self.link.send(what)
+        except OSError:
+            return
+
+    def answer(self) -> Any:
+        """What it says.
+
+        Raises:
+            EOFError: It died.
+        """
+        try:
+            return self.link.recv()
+        except OSError as error:
+            raise EOFError from error
+
+    def say_why(self) -> str:
+        """How it died."""
+        self.process.join(5)
+        code = self.process.exitcode
+        if code is not None and code < 0:
+            name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+            return f"{name}{', out of memory?' if name == 'SIGKILL' else ''}"
+        return f"exit code {code}"
+
+    def end(self, now: bool = False) -> None:
+        """End it: when it has nothing to do, or now."""
+        self.link.close()
+        if now:
+            self.process.kill()
+        self.process.join()
+
+
+def run_here(
+    tasks: Iterable[Task],
+    workers: int,
+    job: str,
+    options: Mapping[str, Any],
+    say: Callable[[str], None],
+) -> Iterator[Outcome]:
+    """Do tasks in the order given, several at a time.
+
+    Args:
+        tasks: What to do.
+        workers: Number of processes.
+        job: The job of all.
+        options: Its options.
+        say: Told what is compiled before the other workers begin.
+
+    Yields:
+        Outcomes as they come. A task whose worker died is begun again once.
+
+    Raises:
+        SixpointError: Workers cannot be started.
+    """
+    waiting = deque(tasks)
+    tries: dict[str, int] = {}
+    pool: list[Worker] = []
+    try:
+        pool += [Worker() for _ in range(min(workers, len(waiting)))]
+        for worker in pool[1:]:
+            worker.ask(Begin(job))  # meanwhile
+        _prepare(pool[0], WarmUp(job, options), say)
+        for worker in pool:
+            worker.ask(waiting.popleft())
+        while pool:
+            ready = wait([worker.link for worker in pool])
+            for worker in [worker for worker in pool if worker.link in ready]:
+                task = worker.task
+                assert task is not None
+                try:
+                    outcome = worker.answer()
+                except EOFError:
+                    why = worker.say_why()
+                    pool.remove(worker)
+                    worker.end()
+                    tries[task.label] = tries.get(task.label, 0) + 1
+                    sweep(task)
+                    if tries[task.label] < TRIES:
+                        say(f"{task.label}: its worker died ({why}); it is begun again")
+                        waiting.append(task)
+                    else:
+                        yield Outcome.failed(task, f"its worker died {TRIES} times ({why})")
+                    if waiting:
+                        pool.append(Worker())
+                        pool[-1].ask(waiting.popleft())
+                    continue
+                if waiting:  # before the outcome is looked at: nobody waits for that
+                    worker.ask(waiting.popleft())
+                else:
+                    pool.remove(worker)
+                    worker.end()
+                yield outcome
+    finally:
+        for worker in pool:
+            worker.end(now=True)
+            if worker.task is not None:
+                sweep(worker.task)
+
+
+def _prepare(worker: Worker, warm: WarmUp, say: Callable[[str], None]) -> None:
+    """Have the first worker compile; the others find the machine code on disk."""
+    worker.ask(warm)
+    try:
+        while not isinstance(answer := worker.answer(), float):
+            if isinstance(answer, SixpointError):
+                raise answer
+            say(f"{answer}, before the other workers begin")
+    except EOFError:
+        raise SixpointError(
+            f"the first worker died before it did anything ({worker.say_why()}); a script must start a batch "
+            'below  if __name__ == "__main__":'
+        ) from None
+
+
+@contextmanager
+def _as_workers_begin() -> Iterator[None]:
+    """Processes started within have one thread each for linear algebra, and leave Ctrl-C to their parent."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    main = threading.current_thread() is threading.main_thread()
+    interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None
+    try:
+        yield
+    finally:
+        if main:
+            signal.signal(signal.SIGINT, interrupt)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name)
+            else:
+                os.environ[name] = value
