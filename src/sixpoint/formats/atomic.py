@@ -12,10 +12,14 @@ import os
 import re
 import secrets
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from sixpoint.errors import FormatError
+
+_DURABLE = ContextVar("durable", default=True)
 
 
 def check_writable(paths: Iterable[Path], force: bool) -> None:
@@ -56,8 +60,9 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
             temporary[target] = spare
             with spare.open("xb") as stream:
                 stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
+                if _DURABLE.get():
+                    stream.flush()
+                    os.fsync(stream.fileno())
         for target, spare in temporary.items():
             fresh = not target.exists()
             spare.replace(target)
@@ -72,6 +77,16 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
             reason = getattr(error, "strerror", None) or str(error)
             raise FormatError(path, f"cannot be written: {reason}") from error
         raise
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """Within, writing does not wait until the disk has a file: for what is checked when it is read again."""
+    token = _DURABLE.set(False)
+    try:
+        yield
+    finally:
+        _DURABLE.reset(token)
 
 
 def remove_leftovers(path: Path, age: float = 0.0) -> None:

@@ -171,7 +171,7 @@ def _come(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Task, Outcome
         key = f"{task.job}-{task.label}-{task.key}-{run}"
         futures.append(client.submit(run_task, task, key=key, pure=False, retries=2, priority=-number))
         waiting[key] = task
-    coming = as_completed(futures)
+    coming = as_completed(futures, loop=client.loop)
     watch = _Watch(client)
     try:
         while waiting:

@@ -1,7 +1,7 @@
 """Tasks on several processes of this machine.
 
-Each process has one task at a time and a pipe of its own: when it dies (out of memory, a crash), the pipe
-says which task it had, and the others go on. A ``ProcessPoolExecutor`` would say only that one of all died.
+Each process has a pipe of its own and does its tasks in order: when it dies (out of memory, a crash), it is
+known which task it was at, and the others go on. A ``ProcessPoolExecutor`` only says that one of all died.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,6 +25,8 @@ from sixpoint.jobs.batch.task import Outcome, Task
 
 TRIES = 2
 """How often a task is begun whose worker died."""
+AHEAD = 2
+"""Tasks that a worker has at once, while there is plenty."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Set to 1 for workers: there is a process for each core."""
 SPAWN = get_context("spawn")  # a fork would copy threads' locks
@@ -68,7 +70,7 @@ def _warm_up(asked: WarmUp, link: Connection) -> float | SixpointError:
 
 
 class Worker:
-    """A process, and what it was asked to do."""
+    """A process, and the tasks it was given: the first is under way."""
 
     def __init__(self) -> None:
         self.link, other = SPAWN.Pipe()
@@ -76,11 +78,12 @@ class Worker:
         with _as_workers_begin():
             self.process.start()
         other.close()
-        self.task: Task | None = None
+        self.tasks: deque[Task] = deque()
 
     def ask(self, what: Task | WarmUp | Begin) -> None:
         """Hand over something to do; what is wrong with the worker shows when it is to answer."""
-        self.task = what if isinstance(what, Task) else None
+        if isinstance(what, Task):
+            self.tasks.append(what)
         try:
             self.link.send(what)
         except OSError:
@@ -98,8 +101,7 @@ class Worker:
             raise EOFError from error
 
     def say_why(self) -> str:
-        """How it died."""
-        self.process.join(5)
+        """How it died, once it is ended."""
         code = self.process.exitcode
         if code is not None and code < 0:
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
@@ -136,8 +138,7 @@ def run_here(
     Raises:
         SixpointError: Workers cannot be started.
     """
-    waiting = deque(tasks)
-    tries: dict[str, int] = {}
+    waiting, tries = deque(tasks), Counter[str]()
     pool: list[Worker] = []
     try:
         pool += [Worker() for _ in range(min(workers, len(waiting)))]
@@ -145,40 +146,46 @@ def run_here(
             worker.ask(Begin(job))  # meanwhile
         _prepare(pool[0], WarmUp(job, options), say)
         for worker in pool:
-            worker.ask(waiting.popleft())
+            _feed(worker, waiting, len(pool))
         while pool:
             ready = wait([worker.link for worker in pool])
             for worker in [worker for worker in pool if worker.link in ready]:
-                task = worker.task
-                assert task is not None
+                task = worker.tasks.popleft()
                 try:
                     outcome = worker.answer()
                 except EOFError:
-                    why = worker.say_why()
                     pool.remove(worker)
                     worker.end()
-                    tries[task.label] = tries.get(task.label, 0) + 1
                     sweep(task)
+                    waiting.extendleft(worker.tasks)  # not begun
+                    tries[task.label] += 1
+                    outcome = Outcome.failed(task, f"its worker died {TRIES} times ({worker.say_why()})")
                     if tries[task.label] < TRIES:
-                        say(f"{task.label}: its worker died ({why}); it is begun again")
+                        say(f"{task.label}: its worker died ({worker.say_why()}); it is begun again")
                         waiting.append(task)
-                    else:
-                        yield Outcome.failed(task, f"its worker died {TRIES} times ({why})")
                     if waiting:
                         pool.append(Worker())
-                        pool[-1].ask(waiting.popleft())
-                    continue
-                if waiting:  # before the outcome is looked at: nobody waits for that
-                    worker.ask(waiting.popleft())
+                        _feed(pool[-1], waiting, len(pool))
+                    if tries[task.label] < TRIES:
+                        continue
                 else:
-                    pool.remove(worker)
-                    worker.end()
+                    _feed(worker, waiting, len(pool))
+                    if not worker.tasks:
+                        pool.remove(worker)
+                        worker.end()
                 yield outcome
     finally:
         for worker in pool:
             worker.end(now=True)
-            if worker.task is not None:
-                sweep(worker.task)
+            for task in worker.tasks:
+                sweep(task)
+
+
+def _feed(worker: Worker, waiting: deque[Task], workers: int) -> None:
+    """See that a worker has something to do, and next while there is plenty: so it never waits for us."""
+    ahead = AHEAD if len(waiting) > AHEAD * workers else 1
+    while waiting and len(worker.tasks) < ahead:
+        worker.ask(waiting.popleft())
 
 
 def _prepare(worker: Worker, warm: WarmUp, say: Callable[[str], None]) -> None:
@@ -190,6 +197,7 @@ def _prepare(worker: Worker, warm: WarmUp, say: Callable[[str], None]) -> None:
                 raise answer
             say(f"{answer}, before the other workers begin")
     except EOFError:
+        worker.process.join()
         raise SixpointError(
             f"the first worker died before it did anything ({worker.say_why()}); a script must start a batch "
             'below  if __name__ == "__main__":'

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from sixpoint.errors import SixpointError
+from sixpoint.formats.atomic import without_waiting
 from sixpoint.jobs.batch.folder import find_done, make_folder, write_record
 from sixpoint.jobs.batch.keys import own_code, task_key
 from sixpoint.jobs.batch.registry import find_job
@@ -25,12 +26,13 @@ CHANGED = "the file changed while the batch ran, or this worker sees another one
 def run_task(task: Task) -> Outcome:
     """Do a task, unless it is done already: by another worker that could not say so.
 
-    Never raises but what ends a process; doing a task twice, also at once, does no harm.
+    Never raises but what ends a process; doing a task twice, also at once, does no harm. Nothing waits for
+    the disk: what a power failure damages has another digest than its record, and is done again.
     """
     start, cpu, notes = time.perf_counter(), time.thread_time(), list[str]()
     metrics, files, error = dict[str, Any](), dict[str, str](), ""
     try:
-        with _collecting(notes.append):
+        with _collecting(notes.append), without_waiting():
             _check(task)
             known = find_done(task)
             if known is not None:
@@ -47,7 +49,8 @@ def run_task(task: Task) -> Outcome:
     else:
         outcome = Outcome(task.name, task.part, DONE, task.key, metrics=metrics, files=files, **more)
     try:
-        write_record(task.out, outcome)
+        with without_waiting():
+            write_record(task.out, outcome)
     except SixpointError as problem:
         return Outcome.failed(task, str(problem), **more)
     return outcome
