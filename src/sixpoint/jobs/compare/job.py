@@ -121,19 +121,19 @@ def report_rows(
     Args:
         study: What was compared on what.
         rows: One per clip and method of the study.
-        out: The folder of the curves, and of the report.
+        out: The folder of the curves, and of the report; the caller has seen that it is ours.
         limits_file: A table of joint limits in place of the shipped one.
         drawn: Clips at most that are drawn, the first of the study; all have their tables.
         force: Draw also what is drawn already.
         progress: Told how far the work is.
 
     Raises:
-        SixpointError: The folder is not ours, or no row has a result.
+        SixpointError: The folder holds results of another version, or no row has a result.
     """
     splits = assign_splits(study.clips, study.methods)
     people = {clip.name: clip.person for clip in study.clips}
     rows = [replace(row, person=people[row.clip], split=splits[row.clip]) for row in rows]
-    store = Store(out, force)
+    store = Store(out, force, ours=True)
     store.keep_rows(rows)
     store.write_results(rows)
     clips = _Clips(None if limits_file is None else Limits.load(limits_file))

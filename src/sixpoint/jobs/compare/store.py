@@ -48,15 +48,16 @@ class Store:
     Args:
         out: The folder; it is made.
         force: Begin again in a folder with results, or write into one that is not ours.
+        ours: The folder is known to be ours, though it has no results yet.
 
     Raises:
         FormatError: The folder is not ours, or holds results of another version.
     """
 
-    def __init__(self, out: Path, force: bool) -> None:
+    def __init__(self, out: Path, force: bool, *, ours: bool = False) -> None:
         self.out = out
         results, known = out / RESULTS, out / KNOWN
-        ours = is_results(results) or is_results(known)
+        ours = ours or is_results(results) or is_results(known)
         prepare_folder(out, force, ours=ours)
         self.rows: dict[str, Row] = {}
         if not force:
