@@ -27,10 +27,10 @@ class Deadly(sp.SequentialIK):
 
 
 class Slow(sp.SequentialIK):
-    """Takes half a second for a file."""
+    """Takes its time for a file."""
 
     def solve_frames(self, targets, progress=None):
-        time.sleep(0.5)
+        time.sleep(0.3)
         return super().solve_frames(targets, progress)
 '''
 

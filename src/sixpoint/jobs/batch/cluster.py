@@ -10,7 +10,7 @@ import os
 import secrets
 import socket
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +37,7 @@ def run_on_cluster(
     job: str,
     options: Mapping[str, Any],
     say: Callable[[str], None],
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """Do tasks on the workers of a Dask scheduler.
 
     Args:
@@ -54,6 +54,8 @@ def run_on_cluster(
         SixpointError: There is no scheduler or worker, workers have other code or do not see the files, or
             all were lost.
     """
+    if not tasks:
+        return
     try:
         from distributed import Client
     except ImportError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -112,10 +112,9 @@ def batch(
     tasks, known = _plan(chosen, library, out, options, suffix, progress)
     todo = sorted((task for task in tasks if task.label not in known), key=lambda task: -task.size)
     count = min(workers or count_cores(), len(todo))
-    came: Iterator[Outcome] = iter(())
-    if todo and scheduler is not None:
+    if scheduler is not None:
         came = run_on_cluster(todo, scheduler, job, options, log.info)
-    elif todo:
+    else:
         came = run_here(todo, count, job, options, log.info)
     table = {outcome.label: outcome for outcome in read_records(out)}
     fresh = _follow(came, len(tasks), len(known), out, table, progress)
@@ -191,7 +190,7 @@ def _check_targets(tasks: Sequence[Task]) -> None:
 
 
 def _follow(
-    came: Iterator[Outcome],
+    came: Generator[Outcome],
     total: int,
     done: int,
     out: Path,
@@ -203,7 +202,7 @@ def _follow(
     written = time.monotonic()
     progress("batch", done, total)
     try:
-        with closing(came):  # type: ignore[type-var]
+        with closing(came):
             for outcome in came:
                 if not outcome.worker:  # nobody lived to write it down
                     write_record(out, outcome)

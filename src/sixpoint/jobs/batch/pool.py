@@ -10,7 +10,7 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -122,7 +122,7 @@ def run_here(
     job: str,
     options: Mapping[str, Any],
     say: Callable[[str], None],
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """Do tasks in the order given, several at a time.
 
     Args:
@@ -140,6 +140,8 @@ def run_here(
     """
     waiting, tries = deque(tasks), Counter[str]()
     pool: list[Worker] = []
+    if not waiting:
+        return
     try:
         pool += [Worker() for _ in range(min(workers, len(waiting)))]
         for worker in pool[1:]:
