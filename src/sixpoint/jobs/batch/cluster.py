@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster: workers need this package and the same file system, nothing else.
+"""Tasks on a Dask cluster: all of it needs this package, and workers the same file system; nothing else.
 
 A task whose worker died is done again by another worker, as often as the scheduler allows
 (``distributed.scheduler.allowed-failures``, 3); one that was not to blame for that has a last try alone.
@@ -103,21 +103,22 @@ def _check_workers(client: Client, tasks: Sequence[Task], say: Callable[[str], N
         raise SixpointError(
             f"the scheduler has no workers after {GATHER:g} s; start some: dask worker {_address(client)}"
         ) from None
+    try:
+        _check_code("the scheduler", client.run_on_scheduler(own_code))
+    except ImportError as error:
+        raise SixpointError(f"the scheduler has no sixpoint ({error}): install it there") from None
     probe = tasks[0].out / PROBE
     write_files({probe: str(probe).encode()}, force=True)
     found = client.run(look, probe, tasks[0].source, on_error="return")
     hosts = {}
     for worker, answer in found.items():
-        if isinstance(answer, ModuleNotFoundError):
+        if isinstance(answer, ImportError):
             raise SixpointError(f"the worker {worker} has no sixpoint ({answer}): install it there")
         if isinstance(answer, BaseException):
             say(f"the worker {worker} does not answer: {answer}")
             continue
         hosts[worker], code, missing = answer
-        if code != own_code():
-            raise SixpointError(
-                f"the worker {worker} has sixpoint {code}, here it is {own_code()}: install the same on both"
-            )
+        _check_code(f"the worker {worker}", code)
         if missing:
             raise SixpointError(
                 f"the worker {worker} does not see {missing}: client and workers need the same file system"
@@ -126,6 +127,11 @@ def _check_workers(client: Client, tasks: Sequence[Task], say: Callable[[str], N
         raise SixpointError(f"no worker answers: {listed(str(answer) for answer in found.values())}")
     say(f"{len(hosts)} workers on {len(set(hosts.values()))} machines")
     return hosts
+
+
+def _check_code(who: str, code: str) -> None:
+    if code != own_code():
+        raise SixpointError(f"{who} has sixpoint {code}, here it is {own_code()}: install the same on both")
 
 
 def _prepare(
