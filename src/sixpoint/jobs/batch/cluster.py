@@ -6,10 +6,12 @@ A task whose worker died is done again by another worker, as often as the schedu
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,18 +62,28 @@ def run_on_cluster(
         from distributed import Client
     except ImportError as error:
         raise SixpointError('--scheduler needs Dask: pip install "sixpoint[cluster]"') from error
+    client = None
     try:
+        _quieten()
         client = Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise SixpointError(
-            f"no Dask scheduler answers at {address} ({type(error).__name__}); start one with: dask scheduler"
-        ) from error
-    try:
         hosts = _check_workers(client, tasks, say)
         _prepare(client, hosts, job, options, say)
         yield from _run(client, tasks)
+    except (OSError, TimeoutError, ValueError) as error:
+        if client is not None:
+            raise SixpointError(f"{LOST}: {type(error).__name__}: {error}") from error
+        raise SixpointError(
+            f"no Dask scheduler answers at {address} ({type(error).__name__}); start one with: dask scheduler"
+        ) from error
     finally:
-        client.close(timeout=5)
+        if client is not None:
+            client.close(timeout=5)
+
+
+def _quieten() -> None:
+    """What is lost we say ourselves, in a line and without traces."""
+    for name in ("distributed", "distributed.client", "distributed.core", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def look(probe: Path, source: Path) -> tuple[str, str, str]:
@@ -112,7 +124,7 @@ def _check_workers(client: Client, tasks: Sequence[Task], say: Callable[[str], N
     found = client.run(look, probe, tasks[0].source, on_error="return")
     hosts = {}
     for worker, answer in found.items():
-        if isinstance(answer, ImportError):
+        if "ImportError" in repr(answer) or "ModuleNotFoundError" in repr(answer):
             raise SixpointError(f"the worker {worker} has no sixpoint ({answer}): install it there")
         if isinstance(answer, BaseException):
             say(f"the worker {worker} does not answer: {answer}")
@@ -125,7 +137,8 @@ def _check_workers(client: Client, tasks: Sequence[Task], say: Callable[[str], N
             )
     if not hosts:
         raise SixpointError(f"no worker answers: {listed(str(answer) for answer in found.values())}")
-    say(f"{len(hosts)} workers on {len(set(hosts.values()))} machines")
+    machines = Counter(hosts.values())
+    say("workers: " + listed(f"{count} on {host}" for host, count in machines.items()))
     return hosts
 
 

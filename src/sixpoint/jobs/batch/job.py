@@ -213,7 +213,8 @@ def _follow(
                     written = time.monotonic()
     except (KeyboardInterrupt, SixpointError):
         count = done + sum(outcome.status == DONE for outcome in fresh.values())
-        log.warning(f"{count} of {total} are done; the same command goes on from there")
+        if fresh:
+            log.warning(f"{count} of {total} are done; the same command goes on from there")
         raise
     finally:
         _write(out, table)
