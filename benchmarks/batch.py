@@ -5,11 +5,11 @@
     python benchmarks/batch.py --made 150            # as many files made of the built-in motions
     python benchmarks/batch.py --cluster             # two Dask workers, one of them killed half way
 
-Busy: processor seconds over the time of the whole command times the workers, start and end included; of the
-command with its workers, and of the workers alone. On a shared machine others take their part: so also without
-the time in which a worker could have run but was kept waiting by others (Linux, ``/proc/PID/schedstat``); that
-is what a quiet machine would show. The cluster's results must be those of the pool, byte for byte; needs
-``pip install "sixpoint[cluster]"``.
+Busy: processor seconds of the command and its workers over its time times the workers, start and end too. On a
+shared machine others take their part, so also: without the time in which a worker could have run but was kept
+waiting (a quiet machine shows at least that); and how much of their lives, from start to end, workers ran or
+wanted to (Linux, ``/proc/PID/schedstat``). The cluster's results must be those of the pool, byte for byte;
+needs ``pip install "sixpoint[cluster]"``.
 """
 
 from __future__ import annotations
@@ -58,42 +58,55 @@ def make_library(folder: Path, count: int) -> None:
 
 
 class Watch(threading.Thread):
-    """Sums what the children of a process run, and wait for a core while they could [s].
+    """Sums what a command and its workers run, and wait for a core while they could [s].
 
-    Waits of the parent count where it has no children: then all of them would wait with it.
+    Attributes:
+        own: What the command itself ran.
+        alone: What it waited before and after there were workers: all of them would wait with it.
+        ran, waited, lived: Sums over workers.
     """
 
-    def __init__(self, parent: int) -> None:
+    def __init__(self, command: int) -> None:
         super().__init__(daemon=True)
-        self.parent, self.over = parent, threading.Event()
-        self.seen: dict[str, tuple[int, int]] = {}
-        self.alone = self.own = 0
+        self.command, self.over = command, threading.Event()
+        self.own = self.alone = self.ran = self.waited = self.lived = 0.0
+        self.start()
 
     def run(self) -> None:
         """Look until it is over."""
-        children = Path(f"/proc/{self.parent}/task/{self.parent}/children")
-        before = 0
+        children = Path(f"/proc/{self.command}/task/{self.command}/children")
+        seen: dict[str, tuple[float, float]] = {}
+        born: dict[str, float] = {}
+        lived: dict[str, float] = {}
+        before = 0.0
         while not self.over.wait(0.02):
             with contextlib.suppress(OSError):
-                pids = children.read_text().split()
-                self.own, waited = read_schedule(str(self.parent))
-                self.alone += 0 if pids else waited - before
+                workers = [pid for pid in children.read_text().split() if is_worker(pid)]
+                self.own, waited = read_schedule(str(self.command))
+                self.alone += 0.0 if workers else waited - before
                 before = waited
-                for pid in pids:
-                    self.seen[pid] = read_schedule(pid)
+                for pid in workers:
+                    seen[pid] = read_schedule(pid)
+                    now = time.monotonic()
+                    lived[pid] = now - born.setdefault(pid, now)
+        self.ran, self.waited = (sum(times[k] for times in seen.values()) for k in (0, 1))
+        self.lived = sum(lived.values())
 
-    def sums(self) -> tuple[float, float, float, float]:
-        """The parent ran, and waited while alone; its children ran and waited [s]."""
+    def stop(self) -> None:
+        """The command has ended."""
         self.over.set()
         self.join()
-        ran, waited = (sum(times[k] for times in self.seen.values()) / 1e9 for k in (0, 1))
-        return self.own / 1e9, self.alone / 1e9, ran, waited
 
 
-def read_schedule(pid: str) -> tuple[int, int]:
-    """How long a process ran, and waited for a core while it could [ns]."""
+def is_worker(pid: str) -> bool:
+    """Whether a child does tasks; another one only keeps the books of multiprocessing."""
+    return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def read_schedule(pid: str) -> tuple[float, float]:
+    """How long a process ran, and waited for a core while it could [s]."""
     ran, waited, _ = map(int, Path(f"/proc/{pid}/schedstat").read_text().split())
-    return ran, waited
+    return ran / 1e9, waited / 1e9
 
 
 def measure_pool(data: Path, out: Path, workers: int, options: list[str]) -> None:
@@ -103,16 +116,16 @@ def measure_pool(data: Path, out: Path, workers: int, options: list[str]) -> Non
     start = time.perf_counter()
     process = subprocess.Popen(command)
     watch = Watch(process.pid)
-    watch.start()
     code = process.wait()
     wall = time.perf_counter() - start
-    own, alone, ran, waited = watch.sums()
-    had, kept = wall * workers, waited + workers * alone
-    busy, quiet = ([100 * cpu / time for cpu in (own + ran, ran)] for time in (had, had - kept))
+    watch.stop()
+    ran, kept = watch.own + watch.ran, watch.waited + workers * watch.alone
     print(
-        f"pool: exit code {code}, {wall:.1f} s; {workers} workers ran {ran:.1f} s, the command itself {own:.1f} s: "
-        f"{busy[0]:.1f} % busy (workers alone {busy[1]:.1f} %); others kept them waiting {kept:.1f} s, without "
-        f"that {quiet[0]:.1f} % (workers alone {quiet[1]:.1f} %); load {os.getloadavg()[0]:.1f}",
+        f"pool: exit code {code}, {wall:.1f} s; {workers} workers and the command ran {ran:.1f} s: "
+        f"{100 * ran / (wall * workers):.1f} % busy; others kept them waiting {kept:.1f} s, without that "
+        f"{100 * ran / (wall * workers - kept):.1f} %; workers ran or wanted to for "
+        f"{100 * (watch.ran + watch.waited) / watch.lived:.1f} % of their lives; "
+        f"load {os.getloadavg()[0]:.1f}",
         flush=True,
     )
 

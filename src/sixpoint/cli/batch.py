@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from sixpoint.cli.options import Force
 from sixpoint.cli.screen import Screen
 from sixpoint.errors import SixpointError
 
 if TYPE_CHECKING:
     from sixpoint.jobs.batch.job import Batch
 
-OWN = ("out", "force", "picture", "clips", "file", "study", "data")
+OWN = ("out", "force", "picture", "report", "live", "view", "study", "data")
 """Parameters of a job's command that a batch decides itself."""
 LISTED = 100
 """Failures at most that are listed; all are in the summary."""
@@ -50,7 +49,10 @@ def batch(
         str | None,
         Parameter(help="Address of a Dask scheduler, tcp://host:port, whose workers share the file system."),
     ] = None,
-    force: Force = False,
+    force: Annotated[
+        bool,
+        Parameter(negative="", help="Do all again, also in the folder of another batch, or of anything."),
+    ] = False,
 ) -> None:
     """Do a job on many files, by all cores of this machine or of a Dask cluster.
 
