@@ -5,11 +5,11 @@
     python benchmarks/batch.py --made 150            # as many files made of the built-in motions
     python benchmarks/batch.py --cluster             # two Dask workers, one of them killed half way
 
-Busy: processor seconds of the command and its workers over its time times the workers, start and end too. On a
-shared machine others take their part, so also: without the time in which a worker could have run but was kept
-waiting (a quiet machine shows at least that); and how much of their lives, from start to end, workers ran or
-wanted to (Linux, ``/proc/PID/schedstat``). The cluster's results must be those of the pool, byte for byte;
-needs ``pip install "sixpoint[cluster]"``.
+Busy: processor seconds of the command and its workers over its time times the workers, start and end too. On
+a shared machine others take their part, so also: without the time in which a worker could have run but was
+kept waiting (a quiet machine shows at least that); and how much of their lives, from start to end, workers
+ran or wanted to (Linux, ``/proc/PID/schedstat``). The cluster's results must be those of the pool, byte for
+byte; needs ``pip install "sixpoint[cluster]"``.
 """
 
 from __future__ import annotations

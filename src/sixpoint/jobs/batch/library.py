@@ -6,8 +6,9 @@ import glob
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from sixpoint.errors import FormatError, SixpointError, listed
@@ -25,11 +26,13 @@ class Library:
         root: The folder that they are named from; absolute.
         files: Absolute, sorted, each once.
         notes: What was found and left out.
+        stems: Of the readable files in folders that were looked at.
     """
 
     root: Path
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
+    stems: dict[Path, Counter[str]] = field(default_factory=dict, repr=False)
 
     def name(self, file: Path) -> str:
         """A file's path within the library, with slashes."""
@@ -41,12 +44,12 @@ class Library:
         Where another readable file differs only in its suffix (``walk.bvh`` beside ``walk.csv``), the suffix
         stays before the new one. So no two results meet, whichever files a pattern takes.
         """
-        twins = [
-            other
-            for other in file.parent.iterdir()
-            if other.stem.casefold() == file.stem.casefold() and other.suffix.lower() in readable
-        ]
-        stem = file.name if len(twins) > 1 else file.stem
+        folder = self.stems.get(file.parent)
+        if folder is None:
+            names = (Path(name) for name in os.listdir(file.parent))  # noqa: PTH208  fast
+            stems = (name.stem.casefold() for name in names if name.suffix.lower() in readable)
+            folder = self.stems[file.parent] = Counter(stems)
+        stem = file.name if folder[file.stem.casefold()] > 1 else file.stem
         return Path(self.name(file)).with_name(stem + suffix).as_posix()
 
 
@@ -81,8 +84,9 @@ def find_files(patterns: Sequence[str], suffixes: Sequence[str], out: Path) -> L
     seen: dict[Path, Path] = {}
     kinds: Counter[str] = Counter()
     made = twice = 0
+    is_made = _made_by_batches(out, library)
     for file in sorted(dict.fromkeys(found)):
-        if _is_made(file, out, library):
+        if is_made(file.parent):
             made += 1
         elif file.suffix.lower() not in suffixes:
             kinds[file.suffix.lower() or "(none)"] += 1
@@ -149,9 +153,15 @@ def _count(kinds: Counter[str]) -> str:
     return listed([f"{count} {kind}" for kind, count in kinds.most_common()], 12)
 
 
-def _is_made(file: Path, out: Path, root: Path) -> bool:
-    """Whether a file is in the folder of this batch, or of another."""
-    if file.resolve().is_relative_to(out):
-        return True
-    above = [folder for folder in file.parents if folder.is_relative_to(root)]
-    return any(read_marker(folder) is not None for folder in above)
+def _made_by_batches(out: Path, root: Path) -> Callable[[Path], bool]:
+    """Tells whether a folder is, or is in, that of this batch or of another; asks once for each."""
+
+    @cache
+    def is_made(folder: Path) -> bool:
+        if folder.resolve() == out or read_marker(folder) is not None:
+            return True
+        return folder.resolve().is_relative_to(out) or (
+            folder != root and folder.is_relative_to(root) and is_made(folder.parent)
+        )
+
+    return is_made

@@ -25,6 +25,8 @@ from sixpoint.jobs.batch.task import Outcome, Task
 
 TRIES = 2
 """How often a task is begun whose worker died."""
+SLOW = 5.0
+"""Kernels that take longer to get ready were compiled, not loaded [s]."""
 AHEAD = 2
 """Tasks that a worker has at once, while there is plenty."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -193,11 +195,15 @@ def _feed(worker: Worker, waiting: deque[Task], workers: int) -> None:
 def _prepare(worker: Worker, warm: WarmUp, say: Callable[[str], None]) -> None:
     """Have the first worker compile; the others find the machine code on disk."""
     worker.ask(warm)
+    told = False
     try:
         while not isinstance(answer := worker.answer(), float):
             if isinstance(answer, SixpointError):
                 raise answer
             say(f"{answer}, before the other workers begin")
+            told = True
+        if answer > SLOW and not told:
+            say(f"compiled kernels in {answer:.0f} s, once, before the other workers began")
     except EOFError:
         worker.process.join()
         raise SixpointError(

@@ -75,7 +75,7 @@ JOBS = {
             "track",
             "sixpoint.jobs.batch.tracking",
             (".c3d", ".trc", ".csv", ".json", ".npz"),
-            (".bvh", ".amc"),
+            (".bvh", ".amc", ".mot", ".csv"),
             (("residual", "marker residual, RMS [m]"),),
         ),
         Job("compare", "sixpoint.jobs.batch.comparing", MOTIONS, ()),
