@@ -124,8 +124,7 @@ def _show(screen: Screen, done: Batch, job: str, out: Path) -> None:
     screen.say(f"{job}: {plural(len(done.library.files), 'file')} of {done.library.root}", style="bold")
     rows = []
     if done.workers:
-        busy = 100 * done.cpu / (done.seconds * done.workers)
-        how = f"in {done.seconds:.1f} s by {plural(done.workers, 'worker')}, {busy:.0f} % busy"
+        how = f"in {done.seconds:.1f} s by {plural(done.workers, 'worker')}; {done.cpu:.1f} s of processor"
         rows.append(("done", f"{total - done.known - failed} {how}"))
     if done.known:
         rows.append(("known", f"{done.known}, unchanged since they were done"))

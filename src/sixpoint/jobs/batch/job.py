@@ -119,7 +119,7 @@ def batch(
     table = {outcome.label: outcome for outcome in read_records(out)}
     fresh = _follow(came, len(tasks), len(known), out, table, progress)
     outcomes = tuple((known | fresh)[task.label] for task in tasks)
-    gather = chosen.find("gather")
+    gather = chosen.find("gather") if any(outcome.status == DONE for outcome in outcomes) else None
     sources = {task.name: task.source for task in tasks}
     made = gather(outcomes, sources, out, options, progress) if gather else []
     ran = len({outcome.worker for outcome in fresh.values()} - {""})
