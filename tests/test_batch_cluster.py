@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,6 +22,7 @@ from batches import METHODS, leftovers, make_library, records, results
 from sixpoint.cli import main
 from sixpoint.jobs.batch import cluster
 from sixpoint.jobs.batch.job import batch
+from sixpoint.jobs.batch.task import Task
 from sixpoint.jobs.reconstruct import reconstruct
 from sixpoint.jobs.solving import Solving
 
@@ -172,6 +174,15 @@ def test_no_workers_is_said(here, scheduler, capsys, monkeypatch):
     monkeypatch.setattr(cluster, "GATHER", 0.5)
     assert main(["batch", "library", "-o", "none", "--scheduler", scheduler]) == 2
     assert "has no workers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("status", ["lost", "pending"])
+def test_a_result_that_died_with_its_worker_is_waited_for(status):
+    """Between the worker's end and the same file done elsewhere, there is no outcome, and no failure."""
+    task = Task("reconstruct", "a.bvh", Path("a.bvh"), Path("out"))
+    assert cluster._outcome(SimpleNamespace(status=status), task) is None
+    with pytest.raises(sp.SixpointError, match=r"scheduler was lost: it cancelled a\.bvh"):
+        cluster._outcome(SimpleNamespace(status="cancelled"), task)
 
 
 def test_a_worker_looks_for_the_files(tmp_path):

@@ -214,9 +214,11 @@ def _come(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Task, Outcome
 
 
 def _outcome(future: Future[Outcome], task: Task) -> Outcome | None:
-    """What came of a task; None where its worker took the result along, and it is done again."""
-    if future.status in ("cancelled", "lost"):
-        raise SixpointError(LOST)
+    """What came of a task; None where its worker took the result along: it is looked up by another."""
+    if future.status in ("lost", "pending"):
+        return None
+    if future.status == "cancelled":
+        raise SixpointError(f"{LOST}: it cancelled {task.label}")
     try:
         return future.result(timeout=CONNECT)
     except TimeoutError:
@@ -244,8 +246,8 @@ class _Watch:
         if now - self.looked < 1.0:
             return
         self.looked = now
-        if self.client.status != "running":
-            raise SixpointError(LOST)
+        if self.client.status not in ("running", "connecting"):
+            raise SixpointError(f"{LOST}: the client is {self.client.status}")
         if self.client.nthreads():
             self.seen = time.monotonic()
         elif now - self.seen > ALONE:
