@@ -243,7 +243,16 @@ def test_leftovers_of_a_dead_writer_go(tmp_path):
     assert not dead.exists()
     assert all(path.exists() for path in others)
     remove_leftovers(tmp_path / "absent" / "x")
+    dead.touch()
+    (tmp_path / "deep").mkdir()
+    deep = tmp_path / "deep" / f".a.csv.{'12' * 6}.tmp"
+    deep.touch()
+    remove_leftovers(tmp_path, age=3600)
+    assert dead.exists() and deep.exists()
+    remove_leftovers(tmp_path)
+    assert [path.exists() for path in (dead, deep, others[0], others[1])] == [False, False, False, True]
     write_files({target: b"x"}, force=True)
+    assert leftovers(tmp_path) == [others[1]]
 
 
 def test_a_comparison_by_parts_is_the_comparison(walk):

@@ -19,6 +19,8 @@ from pathlib import Path
 
 from sixpoint.errors import FormatError
 
+SPARE = re.compile(r"\..+\.[0-9a-f]{12}\.tmp", re.DOTALL)
+"""Names of temporary files."""
 _DURABLE = ContextVar("durable", default=True)
 
 
@@ -89,26 +91,20 @@ def without_waiting() -> Iterator[None]:
         _DURABLE.reset(token)
 
 
-def remove_leftovers(path: Path, age: float = 0.0) -> None:
-    """Delete temporary files of a target whose writer was killed.
+def remove_leftovers(place: Path, age: float = 0.0) -> None:
+    """Delete temporary files whose writer was killed.
 
     Args:
-        path: The target.
+        place: A target; or a folder, for all targets below it.
         age: How old they must be [s]: younger ones may be of another process that is writing.
     """
-    prefix, oldest = _spare_prefix(path), time.time() - age
-    try:
-        spares = [
-            spare
-            for spare in path.parent.iterdir()
-            if spare.name.startswith(prefix) and re.fullmatch(r"[0-9a-f]{12}\.tmp", spare.name[len(prefix) :])
-        ]
-    except OSError:
-        return
-    for spare in spares:
-        with contextlib.suppress(OSError):
-            if spare.stat().st_mtime <= oldest:
-                spare.unlink()
+    folder = place.is_dir()
+    prefix, oldest = "" if folder else _spare_prefix(place), time.time() - age
+    for spare in place.rglob(".*.tmp") if folder else place.parent.glob(".*.tmp"):
+        if SPARE.fullmatch(spare.name) and spare.name.startswith(prefix):
+            with contextlib.suppress(OSError):
+                if spare.stat().st_mtime <= oldest:
+                    spare.unlink()
 
 
 def _spare_prefix(target: Path) -> str:

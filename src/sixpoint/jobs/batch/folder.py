@@ -25,6 +25,8 @@ MARKER, RECORDS, SUMMARY = f"{OURS}/batch.json", f"{OURS}/records", "summary.csv
 COLUMNS = ("file", "part", "status", "error", "seconds")
 LAST = ("files", "notes", "worker")
 VERSION = 1
+STALE = 3600.0
+"""Temporary files of this age have no writer any more [s]."""
 
 
 def read_marker(out: Path) -> dict[str, Any] | None:
@@ -59,6 +61,7 @@ def begin(out: Path, job: str, library: Path, force: bool) -> None:
             raise FormatError(out, "holds a batch of another version of sixpoint: choose another folder")
     prepare_folder(out, force, ours=marker is not None)
     prepare_folder(out / RECORDS, True)
+    remove_leftovers(out, STALE)
     if force:
         for path in (out / RECORDS).rglob("*.json"):
             path.unlink()
@@ -94,10 +97,11 @@ def find_done(task: Task) -> Outcome | None:
     return outcome if whole and outcome.status == DONE and outcome.key == task.key else None
 
 
-def sweep(task: Task, age: float = 0.0) -> None:
-    """Delete what a dead worker had half written of a task; what is younger than ``age`` [s] may be alive."""
-    for path in (task.out / task.target, record_path(task, task.out)):
-        remove_leftovers(path, age)
+def sweep(task: Task) -> None:
+    """Delete what a dead worker had half written of a task."""
+    remove_leftovers(record_path(task, task.out))
+    if task.target:
+        remove_leftovers(task.out / task.target)
 
 
 def read_records(out: Path) -> list[Outcome]:

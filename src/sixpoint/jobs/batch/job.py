@@ -18,7 +18,6 @@ from sixpoint.jobs.batch.folder import (
     begin,
     find_done,
     read_records,
-    sweep,
     write_record,
     write_summary,
 )
@@ -33,8 +32,6 @@ log = logging.getLogger("sixpoint")
 
 WRITTEN_EVERY = 10.0
 """How often the summary is written while work goes on [s]."""
-STALE = 3600.0
-"""Temporary files of this age have no writer [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +170,6 @@ def _plan(
             done = find_done(task)
             if done is not None:
                 known[task.label] = done
-            else:
-                sweep(task, STALE)
     progress("looking at files", len(library.files), len(library.files))
     _check_targets(tasks)
     return tasks, known
