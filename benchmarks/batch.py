@@ -43,7 +43,7 @@ KILL_AT = 0.3  # share of the files that is done when a worker is killed
 
 
 def make_library(folder: Path, count: int) -> None:
-    """Files of such lengths as the CMU database has, of the built-in motions; each with an ASF of its own."""
+    """AMC files of the built-in motions, as long as takes of the CMU database; each with its own ASF."""
     rng = np.random.default_rng(0)
     names = list(sp.SAMPLES)
     for number in range(count):
