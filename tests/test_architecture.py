@@ -56,7 +56,7 @@ LIBRARIES = {
     "study": {"numpy", "scipy", "matplotlib", "torch"},
     "viewer": {"numpy", "viser"},
     "render": {"numpy", "scipy", "embreex", "av", "PIL"},
-    "jobs": {"numpy", "viser"},
+    "jobs": {"numpy", "viser", "distributed"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
 """Room -> third-party libraries it may import."""

@@ -66,6 +66,8 @@ def test_commands_run(command, tmp_path, monkeypatch, capsys):
     sp.save_targets(figure.targets(motion), "points.csv")
     if "convert" not in command:
         sp.save(motion, "take.bvh")
+    Path("library").mkdir()
+    sp.save(motion, "library/walk.bvh")
     Path("hero.vrm").write_bytes(make_avatar("vrm1"))
     sp.save_markers(walking_markers(), "gait.c3d")
     words = shlex.split(command)[1:]

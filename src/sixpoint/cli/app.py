@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 import sixpoint
+from sixpoint.cli.batch import batch
 from sixpoint.cli.compare import compare
 from sixpoint.cli.convert import convert
 from sixpoint.cli.data import data
@@ -38,7 +39,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, view, reconstruct, render, compare, convert, info, live, study, data):
+    for command in (demo, view, reconstruct, render, compare, batch, convert, info, live, study, data):
         app.command(command)
     return app
 

@@ -109,16 +109,9 @@ def reconstruct(
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
     from sixpoint.jobs.reconstruct import Body
     from sixpoint.jobs.reconstruct import reconstruct as run
-    from sixpoint.jobs.solving import Solving, parse_rotations, parse_weights
+    from sixpoint.jobs.solving import parse_solving
 
-    solving = Solving(
-        method,
-        None if weights is None else parse_weights(weights),
-        search,
-        limits=not no_limits,
-        limits_file=limits,
-        rotations=() if rotations is None else parse_rotations(rotations),
-    )
+    solving = parse_solving(method, weights, search, rotations, limits, no_limits)
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
     screen = Screen()
     with screen.progress() as progress:

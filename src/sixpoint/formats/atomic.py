@@ -9,11 +9,19 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from sixpoint.errors import FormatError
+
+SPARE = re.compile(r"\..+\.[0-9a-f]{12}\.tmp", re.DOTALL)
+"""Names of temporary files."""
+_DURABLE = ContextVar("durable", default=True)
 
 
 def check_writable(paths: Iterable[Path], force: bool) -> None:
@@ -50,12 +58,13 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
     try:
         for path, data in contents.items():
             target = path.resolve()
-            spare = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+            spare = target.with_name(f"{_spare_prefix(target)}{secrets.token_hex(6)}.tmp")
             temporary[target] = spare
             with spare.open("xb") as stream:
                 stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
+                if _DURABLE.get():
+                    stream.flush()
+                    os.fsync(stream.fileno())
         for target, spare in temporary.items():
             fresh = not target.exists()
             spare.replace(target)
@@ -70,3 +79,33 @@ def write_files(contents: Mapping[Path, bytes], force: bool = False) -> None:
             reason = getattr(error, "strerror", None) or str(error)
             raise FormatError(path, f"cannot be written: {reason}") from error
         raise
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """Within, writing does not wait until the disk has a file: for what is checked when it is read again."""
+    token = _DURABLE.set(False)
+    try:
+        yield
+    finally:
+        _DURABLE.reset(token)
+
+
+def remove_leftovers(place: Path, age: float = 0.0) -> None:
+    """Delete temporary files whose writer was killed.
+
+    Args:
+        place: A target; or a folder, for all targets below it.
+        age: How old they must be [s]: younger ones may be of another process that is writing.
+    """
+    folder = place.is_dir()
+    prefix, oldest = "" if folder else _spare_prefix(place), time.time() - age
+    for spare in place.rglob(".*.tmp") if folder else place.parent.glob(".*.tmp"):
+        if SPARE.fullmatch(spare.name) and spare.name.startswith(prefix):
+            with contextlib.suppress(OSError):
+                if spare.stat().st_mtime <= oldest:
+                    spare.unlink()
+
+
+def _spare_prefix(target: Path) -> str:
+    return f".{target.name[:100]}."

@@ -87,6 +87,25 @@ def parse_rotations(text: str) -> tuple[str, ...]:
     return EFFECTORS if names == ("all",) else names
 
 
+def parse_solving(
+    method: str = DEFAULT,
+    weights: str | None = None,
+    search: str | None = None,
+    rotations: str | None = None,
+    limits: Path | None = None,
+    no_limits: bool = False,
+) -> Solving:
+    """How to solve, from the options of the command line."""
+    return Solving(
+        method,
+        None if weights is None else parse_weights(weights),
+        search,
+        limits=not no_limits,
+        limits_file=limits,
+        rotations=() if rotations is None else parse_rotations(rotations),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Solved:
     """What a solver made of targets.

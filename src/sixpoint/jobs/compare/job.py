@@ -13,13 +13,14 @@ from pathlib import Path
 import sixpoint
 from sixpoint.body.limits import Limits
 from sixpoint.errors import SixpointError
-from sixpoint.jobs.compare.keys import digest, row_keys
+from sixpoint.jobs.compare.keys import row_keys
 from sixpoint.jobs.compare.methods import Method
 from sixpoint.jobs.compare.report import write_report
 from sixpoint.jobs.compare.run import OpenClip, failed_row, open_clip, run_method
 from sixpoint.jobs.compare.splits import assign_splits
 from sixpoint.jobs.compare.store import RESULTS, Store
 from sixpoint.jobs.compare.study import Clip, Study
+from sixpoint.jobs.digests import digest
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.study.comparison.claims import check_claims
 from sixpoint.study.comparison.model import ClipRuns, Comparison, Row, Run
@@ -102,14 +103,62 @@ def compare(
             store.write_results(rows)
             progress("comparing", len(rows), total)
         clips.forget(clip)
+    return _report(study, rows, clips, store, measured, force, progress)
+
+
+def report_rows(
+    study: Study,
+    rows: Sequence[Row],
+    out: Path,
+    *,
+    limits_file: Path | None = None,
+    drawn: int | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Compared:
+    """Report rows that were measured elsewhere, with their curves in the folder (``store.write_curves``).
+
+    Args:
+        study: What was compared on what.
+        rows: One per clip and method of the study.
+        out: The folder of the curves, and of the report; the caller has seen that it is ours.
+        limits_file: A table of joint limits in place of the shipped one.
+        drawn: Clips at most that are drawn, the first of the study; all have their tables.
+        force: Draw also what is drawn already.
+        progress: Told how far the work is.
+
+    Raises:
+        SixpointError: The folder holds results of another version, or no row has a result.
+    """
+    splits = assign_splits(study.clips, study.methods)
+    people = {clip.name: clip.person for clip in study.clips}
+    rows = [replace(row, person=people[row.clip], split=splits[row.clip]) for row in rows]
+    store = Store(out, force, ours=True)
+    store.keep_rows(rows)
+    store.write_results(rows)
+    clips = _Clips(None if limits_file is None else Limits.load(limits_file))
+    return _report(study, rows, clips, store, len(rows), force, progress, drawn)
+
+
+def _report(
+    study: Study,
+    rows: Sequence[Row],
+    clips: _Clips,
+    store: Store,
+    measured: int,
+    force: bool,
+    progress: Progress,
+    drawn: int | None = None,
+) -> Compared:
+    """Draw the report, unless it was drawn of the same."""
     if all(row.error for row in rows):
         raise SixpointError(f"no method gave a result; {rows[0].clip}, {rows[0].method}: {rows[0].error}")
-    files = (out / RESULTS, *(out / name for name in REPORT))
-    stamp = digest(f"{study} {rows_to_csv(rows)}".encode())
+    files = (store.out / RESULTS, *(store.out / name for name in REPORT))
+    stamp = digest(f"{study} {drawn} {rows_to_csv(rows)}".encode())
     if not force and store.is_drawn(stamp, files):
         return Compared(tuple(rows), measured, files, False)
-    comparison = _gather(study, rows, clips, store, progress)
-    write_report(comparison, out, progress)
+    comparison = _gather(study, rows, clips, store, progress, drawn)
+    write_report(comparison, store.out, progress)
     store.set_drawn(stamp)
     return Compared(tuple(rows), measured, files, True)
 
@@ -150,15 +199,20 @@ def _reporting(progress: Progress, what: str, frames: int) -> Callable[[int], No
     return lambda done: progress(what, done, frames)
 
 
-def _gather(study: Study, rows: Sequence[Row], clips: _Clips, store: Store, progress: Progress) -> Comparison:
-    """The comparison as the report wants it."""
-    drawn, notes = [], []
+def _gather(
+    study: Study, rows: Sequence[Row], clips: _Clips, store: Store, progress: Progress, most: int | None
+) -> Comparison:
+    """The comparison as the report wants it, with pictures of the first ``most`` clips that can be read."""
+    drawn: list[ClipRuns] = []
+    notes: list[str] = []
     for number, clip in enumerate(study.clips):
         progress("gathering", number, len(study.clips))
-        opened = clips.get(clip)
-        clips.forget(clip)
         if clip.note:
             notes.append(clip.note)
+        if most is not None and len(drawn) >= most:
+            continue
+        opened = clips.get(clip)
+        clips.forget(clip)
         if isinstance(opened, SixpointError):
             continue
         runs = {

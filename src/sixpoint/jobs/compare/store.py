@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from zipfile import BadZipFile
@@ -20,21 +21,43 @@ RESULTS, KNOWN, RUNS, DRAWN = "results.csv", "runs/known.csv", "runs", "runs/rep
 DAMAGED = (OSError, ValueError, KeyError, BadZipFile, EOFError)
 
 
+def curves_path(out: Path, key: str) -> Path:
+    """Where the curves of a row are."""
+    return out / RUNS / f"{key}.npz"
+
+
+def write_curves(out: Path, key: str, run: Run) -> Path:
+    """Write what is drawn of a row, whole or not at all; several processes may do it at once."""
+    data = io.BytesIO()
+    np.savez_compressed(
+        data,
+        position=run.position,
+        orientation=run.orientation,
+        rotations=run.sample.rotations,
+        translations=run.sample.translations,
+        moving=np.array(run.sample.moving),
+    )
+    path = curves_path(out, key)
+    write_files({path: data.getvalue()}, force=True)
+    return path
+
+
 class Store:
     """Rows and curves of a folder; a row that is not whole counts as unknown.
 
     Args:
         out: The folder; it is made.
         force: Begin again in a folder with results, or write into one that is not ours.
+        ours: The folder is known to be ours, though it has no results yet.
 
     Raises:
         FormatError: The folder is not ours, or holds results of another version.
     """
 
-    def __init__(self, out: Path, force: bool) -> None:
+    def __init__(self, out: Path, force: bool, *, ours: bool = False) -> None:
         self.out = out
         results, known = out / RESULTS, out / KNOWN
-        ours = is_results(results) or is_results(known)
+        ours = ours or is_results(results) or is_results(known)
         prepare_folder(out, force, ours=ours)
         self.rows: dict[str, Row] = {}
         if not force:
@@ -64,19 +87,12 @@ class Store:
     def keep(self, row: Row, run: Run | None) -> None:
         """Keep a row and what is drawn of it, whole or not at all."""
         if run is not None:
-            path = self._curves(row.key)
-            spare = path.with_name(f".{path.name}.tmp.npz")
-            sample = run.sample
-            np.savez_compressed(
-                spare,
-                position=run.position,
-                orientation=run.orientation,
-                rotations=sample.rotations,
-                translations=sample.translations,
-                moving=np.array(sample.moving),
-            )
-            spare.replace(path)
-        self.rows[row.key] = row
+            write_curves(self.out, row.key, run)
+        self.keep_rows([row])
+
+    def keep_rows(self, rows: Sequence[Row]) -> None:
+        """Keep rows whose curves were written before."""
+        self.rows |= {row.key: row for row in rows}
         self._write(KNOWN, list(self.rows.values()))
 
     def load(self, row: Row, opened: OpenClip) -> Run:
@@ -109,7 +125,7 @@ class Store:
         write_files({self.out / DRAWN: stamp.encode()}, force=True)
 
     def _curves(self, key: str) -> Path:
-        return self.out / RUNS / f"{key}.npz"
+        return curves_path(self.out, key)
 
     def _write(self, name: str, rows: Sequence[Row]) -> None:
         write_files({self.out / name: rows_to_csv(rows).encode()}, force=True)
