@@ -147,4 +147,7 @@ def _missing(places: Places) -> tuple[str, ...]:
         **{f"{s}_arm": (f"{s}_upper_arm", f"{s}_forearm", f"{s}_hand") for s in ("l", "r")},
         **{f"{s}_leg": (f"{s}_thigh", f"{s}_shank", f"{s}_foot", f"{s}_toes") for s in ("l", "r")},
     }
-    return tuple(part for part in PARTS if not places.on(*segments[part]))
+    shown = {part for part in PARTS if places.on(*segments[part])}
+    if places.columns("l_shoulder_centre", "r_shoulder_centre"):
+        shown.add("trunk")
+    return tuple(part for part in PARTS if part not in shown)

@@ -113,9 +113,8 @@ def _turn_upper(
     )
     local = np.einsum("fyx,fmy->fmx", turned, observed[:, places.on(lower)] - place[:, None])
     axis, ratio = fit_axis(local)
-    across = (
-        float(np.sqrt(np.nanmean(np.nanvar(local, axis=0).sum(axis=-1)))) if np.isfinite(local).any() else 0.0
-    )
+    told = local[:, np.isfinite(local[..., 0]).any(axis=0)]
+    across = float(np.sqrt(np.mean(np.nanvar(told, axis=0).sum(axis=-1)))) if told.size else 0.0
     seen = np.isfinite(turned[:, 0, 0])
     if ratio < PLANE or across < LEAST_SWEEP or not seen.any():
         return
@@ -130,7 +129,9 @@ def _turn_upper(
     above = placed.world[:, kinematics.skeleton.parents[joint]]
     state.poses[:, kinematics.dofs(root)] = logarithm(np.swapaxes(above, 1, 2) @ new)
     seen_from = np.einsum("fyx,fmy->fmx", new, observed[:, columns] - placed.positions[:, joint, None])
-    moved = np.nanmedian(np.where(np.isfinite(seen_from), seen_from, np.nan), axis=0)
+    ever = np.isfinite(seen_from[..., 0]).any(axis=0)
+    moved = np.full((len(columns), 3), np.nan)
+    moved[ever] = np.nanmedian(seen_from[:, ever], axis=0)
     moved -= places.reach[columns] @ state.lengths
     near = np.abs(moved - places.offsets[columns]) < 2.0 * places.std[columns]
     state.offsets[columns] = np.where(near.all(axis=1, keepdims=True), moved, state.offsets[columns])
