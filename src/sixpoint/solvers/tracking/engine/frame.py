@@ -1,0 +1,192 @@
+"""The loop of one frame of markers, and the compiled entry: frames of markers in, poses out."""
+
+from math import exp
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.prioritized.engine.frame import posture_wish
+from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges, retract
+from sixpoint.solvers.prioritized.engine.limits import hold_limits
+from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, unpack_model, unpack_scratch
+from sixpoint.solvers.prioritized.engine.step import scale_step
+from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.engine.clusters import build_cluster
+from sixpoint.solvers.tracking.engine.packing import unpack_options
+from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
+from sixpoint.solvers.tracking.engine.step import solve_step
+
+COAST = 0.12  # what no marker sees goes on for about so long [s]
+SMOOTH = 0.02  # rates of change are means over about so long [s]
+SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
+TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
+CAP = 6.0  # largest speed towards the posture [rad/s]
+
+
+@helper
+def predict(m, state, speed, dt):
+    """Move the state on at its rates of change."""
+    joints = len(m.parent)
+    for k in range(3):
+        state[joints, k] += dt * speed[joints, k]
+    for j in range(joints):
+        if m.kind[j] == BALL:
+            turn = qt.exp((dt * speed[j, 0], dt * speed[j, 1], dt * speed[j, 2]))
+            qt.store(state, j, qt.normalised(qt.mul(turn, qt.load(state, j))))
+        elif m.kind[j] == HINGES:
+            for k in range(m.size[j]):
+                state[joints + 1 + j, k] += dt * speed[joints + 1 + j, k]
+
+
+@helper
+def update_speed(m, state, before, speed, table, flags, seen, dt):
+    """Rates of change from two states; of joints that carry no seen marker they fade."""
+    joints = len(m.parent)
+    for j in range(joints):
+        seen[j] = 0
+    for i in range(len(flags)):
+        if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
+            j = table[i, tp.JOINT]
+            while j >= 0 and seen[j] == 0:
+                seen[j] = 1
+                j = m.parent[j]
+    share = dt / (SMOOTH + dt)
+    fade = exp(-dt / COAST)
+    for k in range(3):
+        rate = (state[joints, k] - before[joints, k]) / dt
+        speed[joints, k] += share * (rate - speed[joints, k])
+        if seen[m.base] == 0:
+            speed[joints, k] *= fade
+    for j in range(joints):
+        keep = 1.0 if seen[j] else fade
+        if m.kind[j] == BALL:
+            turn = qt.log(qt.mul(qt.load(state, j), qt.inv(qt.load(before, j))))
+            for k in range(3):
+                speed[j, k] = keep * (speed[j, k] + share * (turn[k] / dt - speed[j, k]))
+        elif m.kind[j] == HINGES:
+            row = joints + 1 + j
+            for k in range(m.size[j]):
+                rate = (state[row, k] - before[row, k]) / dt
+                speed[row, k] = keep * (speed[row, k] + share * (rate - speed[row, k]))
+
+
+@helper
+def largest_step(m, w, step):
+    """Largest change of a coordinate in a row."""
+    largest = 0.0
+    for c in range(len(m.hinges)):
+        largest = max(largest, abs(w.rows[step, c]))
+    return largest
+
+
+@helper
+def copy_rows(source, target):
+    for i in range(len(source)):
+        for k in range(4):
+            target[i, k] = source[i, k]
+
+
+@helper
+def improve(
+    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, rest, tensor, normal, o
+):
+    """Iterate one frame; returns the iterations."""
+    step = len(w.row) + 1
+    settings = Settings(o.limits, 1.0, TURN, SHIFT, 1e-4, o.posture, CAP * o.dt, False, o.most, 1, 1)
+    if o.limits:
+        hold_limits(m, balls, state)
+    for n in range(o.most):
+        compute_world(m, w, state)
+        for k in range(len(clusters)):
+            build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
+        posture = -1
+        if o.posture > 0.0 and (n == 0 or o.cold):
+            posture = step + 1
+            posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
+        solve_step(m, w, balls, index, clusters, forced, state, o.limits, o, posture, normal)
+        scale_step(m, w, settings, step, 1.0)
+        retract(m, w, state, step)
+        if o.limits:
+            hold_limits(m, balls, state)
+        if largest_step(m, w, step) < (1e-3 if o.cold else SMALL):
+            return n + 1
+    return o.most
+
+
+@entry
+def track_markers(
+    body,
+    integers,
+    balls,
+    index,
+    values,
+    table,
+    segments,
+    clusters,
+    numbers,
+    options,
+    markers,
+    rest,
+    state,
+    speed,
+    memory,
+    forced,
+    before,
+    ahead,
+    tensor,
+    normal,
+    vectors,
+    rows,
+    small,
+    marks,
+    seen,
+    rotations,
+    translations,
+    flags,
+    residual,
+    iterations,
+):
+    """Follow every frame of markers (F, M, 3), NaN where one is not seen.
+
+    Written are the rig's local rotations, the base's position, what became of every marker, its distance from
+    its place on the body [m] and the iterations; ``state``, ``speed`` and ``memory`` go on.
+    """
+    m = unpack_model(body, integers)
+    joints, columns = len(m.parent), len(m.hinges)
+    w = unpack_scratch(vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points))
+    o = unpack_options(options)
+    for f in range(len(markers)):
+        goal = markers[f]
+        copy_rows(state, before)
+        if o.cold:
+            for i in range(len(table)):
+                flags[f, i] = tp.USED if is_seen(goal, i) else tp.LOST
+        else:
+            predict(m, state, speed, o.dt)
+            compute_world(m, w, state)
+            screen(w, table, segments, numbers, memory, flags[f], goal, ahead, o)
+        iterations[f] = improve(
+            m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, rest, tensor, normal, o
+        )
+        compute_world(m, w, state)
+        if not o.cold:
+            learn_distances(w, table, segments, numbers, memory, flags[f], goal, o.dt)
+            update_speed(m, state, before, speed, table, flags[f], seen, o.dt)
+        locals_of_hinges(m, state)
+        for i in range(len(table)):
+            residual[f, i] = 0.0
+            if flags[f, i] == tp.LOST:
+                continue
+            joint = table[i, tp.JOINT]
+            place = vec.add(
+                vec.load(w.position, joint),
+                qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i)),
+            )
+            measured = vec.load(goal, i)
+            if not o.cold and flags[f, i] != tp.REJECTED and memory[i, tp.EASE_RATE] > 0.0:
+                measured = vec.sub(measured, vec.load(memory[:, tp.EASE : tp.EASE + 3], i))
+            residual[f, i] = vec.norm(vec.sub(measured, place))
+        for j in range(joints):
+            local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(state, j)), qt.load(m.after, j))
+            qt.store(rotations[f], j, local)
+        vec.store(translations, f, vec.load(state, joints))
