@@ -44,7 +44,7 @@ ALLOWED = {
 LIBRARIES = {
     "kernels": {"numpy", "numba"},
     "body": {"numpy", "scipy"},
-    "formats": {"numpy", "scipy"},
+    "formats": {"numpy", "scipy", "ezc3d"},
     "samples": {"numpy", "scipy"},
     "signals": {"numpy", "scipy"},
     "calibration": {"numpy", "scipy"},
@@ -87,7 +87,17 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch", "viser"}:
+        elif parts[0] in {
+            "numpy",
+            "scipy",
+            "numba",
+            "matplotlib",
+            "cyclopts",
+            "rich",
+            "torch",
+            "viser",
+            "ezc3d",
+        }:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

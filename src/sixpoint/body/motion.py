@@ -27,7 +27,8 @@ class FileSpace:
 
     Attributes:
         unit: Metres per file unit.
-        up: Axis of the file's world that points up, ``"y"`` or ``"z"``.
+        up: Axis of the file's world that points up, ``"y"`` or ``"z"``; marker files also have
+            ``"x"`` and the three with a minus.
         unit_source: Where the unit comes from ("file", "guessed", "given").
         order: Euler order of the file's angles, for formats that leave it open.
         up_source: Where the up axis comes from ("convention", "guessed", "given").
