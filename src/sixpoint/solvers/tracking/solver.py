@@ -30,6 +30,8 @@ Flags = NDArray[np.int64]
 
 CHUNK = 64  # frames between two reports of progress
 COLD, STRAYS = 60, 4  # iterations of a first frame, and times that its strays are left out
+CAUTIOUS = 0.1  # damping of a first frame, whose steps are large [m]
+POOR = 0.03  # a first frame that is off by more on average is also begun without limits [m]
 FAR = 1e7  # a marker farther away is not seen [m]
 IDLE = 1.0  # time in which what no marker tells goes most of its way to the relaxed posture [s]
 LOST, REJECTED, SWAPPED = tp.LOST, tp.REJECTED, tp.SWAPPED
@@ -101,7 +103,7 @@ class MarkerTracker:
         flext: bool = True,
         iterations: int = 3,
         gate: float = 0.04,
-        damping: float = 0.01,
+        damping: float = 0.05,
         tolerance: float = 0.02,
     ) -> None:
         if not (int(iterations) == iterations and iterations >= 1):
@@ -180,11 +182,13 @@ class MarkerTracker:
         markers = self._checked(np.asarray(markers, float))
         if not (np.isfinite(rate) and rate > 0):
             raise TargetError(f"the frame rate must be positive, got {rate}")
-        out = self._follow(markers, 1 / rate, progress or _silent, 0)
+        report = progress or _silent
+        out, state = self._follow(markers, 1 / rate, report)
         if two_sided is None:
             two_sided = len(markers) > 1 and bool(np.any(out.flags != tp.USED))
-        if two_sided:
-            back = self._follow(markers[::-1], 1 / rate, progress or _silent, len(markers))
+        if two_sided:  # the way back begins where this one ended, and knows what it has learnt
+            state.speed[:] *= -1.0
+            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done))
             out = blend(self.body, self.model, out, Followed(*(array[::-1] for array in back)), markers, rate)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
@@ -195,38 +199,60 @@ class MarkerTracker:
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
         self.solve(places, self.solve(places), 0.01)
 
-    def _follow(self, markers: Array, dt: float, progress: Callable[[int], None], done: int) -> Followed:
-        """One way through the frames."""
+    def _follow(
+        self, markers: Array, dt: float, progress: Callable[[int], None]
+    ) -> tuple[Followed, State]:
+        """Once through the frames; those before the first with enough markers take its pose."""
         first = next((f for f, frame in enumerate(markers) if _enough(frame)), 0)
         begun, state = self._begin(markers[first])
-        parts = [begun] * (first + 1)
-        options = self._options_at(dt)
-        for start in range(first + 1, len(markers), CHUNK):
-            parts.append(self._engine.run(markers[start : start + CHUNK], self._rest, state, options))
-            progress(done + min(start + CHUNK, len(markers)))
-        out = Followed(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done))
+        out = Followed(*(np.concatenate(arrays) for arrays in zip(*[begun] * (first + 1), rest, strict=True)))
         out.flags[:first] = np.where(np.isfinite(markers[:first, :, 0]), tp.REJECTED, tp.LOST)
         out.residual[:first] = 0.0
-        return out
+        return out, state
+
+    def _run(self, markers: Array, state: State, dt: float, progress: Callable[[int], None]) -> Followed:
+        """Frames that continue a state, in chunks."""
+        parts = []
+        for start in range(0, max(len(markers), 1), CHUNK):
+            chunk = markers[start : start + CHUNK]
+            parts.append(self._engine.run(chunk, self._rest, state, self._options_at(dt)))
+            progress(start + len(chunk))
+        return Followed(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def _begin(self, markers: Array) -> tuple[Followed, State]:
         """A first frame: all markers at one level, from the neutral pose at the pelvis; strays are left out."""
         seen = markers.copy()
-        options = self._options._replace(cold=True, most=COLD, posture=0.02)
         for _ in range(STRAYS):
-            pose = place_base(self.body, self.model, seen)
-            state = self._starter.fresh(pose)
-            out = self._starter.run(seen[None], self._rest, state, options)
+            out, pose = self._begin_with(seen)
             strays = refuse_strays(out.residual[0], out.flags[0], self._options.gate)
             if not strays.any():
                 break
             seen[strays] = np.nan
-        state = self._engine.fresh(state.pose)
+        state = self._engine.fresh(pose)
         quiet = self._options._replace(dt=1e-6, most=10)
         out = self._engine.run(seen[None], self._rest, state, quiet)
         state.speed[:] = 0.0
         out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
         return out, state
+
+    def _begin_with(self, seen: Array) -> tuple[Followed, Array]:
+        """The better one of two ways to the first pose: within the limits all along, or at last."""
+        options = self._options._replace(cold=True, most=COLD, posture=0.02, damping=CAUTIOUS)
+        start = place_base(self.body, self.model, seen)
+        found = []
+        for limits in (True, False):
+            state = self._starter.fresh(start)
+            if not (limits or not self._options.limits):
+                self._starter.run(seen[None], self._rest, state, options._replace(limits=False))
+            out = self._starter.run(seen[None], self._rest, state, options)
+            used = out.flags[0] == tp.USED
+            off = float(np.mean(out.residual[0][used])) if used.any() else 0.0
+            found.append((off, out, state.pose))
+            if off < POOR:
+                break
+        _, out, pose = min(found, key=lambda entry: entry[0])
+        return out, pose
 
     def _checked(self, markers: Array) -> Array:
         if markers.ndim != 3 or markers.shape[1:] != (len(self.names), 3) or len(markers) == 0:

@@ -15,6 +15,7 @@ from sixpoint.solvers.tracking.running import Followed
 Array = NDArray[np.float64]
 
 SETTLE = 0.15  # time in which a marker that came back is trusted again [s]
+NEVER = 1.0  # doubt of a marker that was not seen yet [s]
 EVEN = 0.02  # doubt of both ways where nothing is missing [s]
 
 
@@ -56,7 +57,7 @@ def doubt_of(flags: NDArray[np.int64], rate: float) -> Array:
     """(F, M) time since each marker was used [s]; after it is back what had grown fades."""
     out = np.zeros(flags.shape)
     fade = np.exp(-1 / (SETTLE * rate))
-    known = np.zeros(flags.shape[1])
+    known = np.where(flags[0] == tp.USED, 0.0, NEVER)
     for f, row in enumerate(flags):
         lost = (row == tp.LOST) | (row == tp.REJECTED)
         known = np.where(lost, known + 1 / rate, known * fade)

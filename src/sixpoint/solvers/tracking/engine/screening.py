@@ -12,10 +12,11 @@ from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine.wishes import NONE
 from sixpoint.solvers.tracking.engine import packing as tp
 
-ACCELERATION = 200.0  # what a prediction may miss by half of this times the square of the frame time [m/s^2]
+ACCELERATION = 400.0  # what a prediction may miss by half of this times the square of the frame time [m/s^2]
 DRIFT = 3.0  # speed at which a segment without markers leaves its prediction [m/s]
 WANDER = 0.05  # the same of a lost marker on a segment that is seen [m/s]
 PATIENCE = 0.25  # a refused marker that has no better neighbours is believed after this time [s]
+MOST = 0.4  # share of refused markers from which on all are believed
 RETURN = 2.5  # speed at which a marker that came back is followed at first [m/s]
 QUICKEST, SLOWEST = 0.06, 0.3  # times in which what is left of the jump falls to a third [s]
 FORGOTTEN = 2.0  # a marker that is lost so long [s] no longer counts as missing from its segment
@@ -85,7 +86,7 @@ def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
         if flags[i] == tp.LOST:
             continue
         vec.store(ahead, i, vec.sub(vec.load(ahead, i), common))
-        reach = slack + 5.0 * numbers[i, tp.SPREAD] + WANDER * memory[i, tp.UNSEEN]
+        reach = slack + numbers[i, tp.SPREAD] + WANDER * memory[i, tp.UNSEEN]
         reach = reach if seen >= 3 else 1.5 * reach
         ahead[i, 3] = reach
         if memory[i, tp.KNOWN] > 0.0 and vec.norm(vec.load(ahead, i)) > reach:
@@ -182,10 +183,15 @@ def trust_distances(segments, memory, flags, s, dt):
 @helper
 def screen(w, table, segments, numbers, memory, flags, goal, ahead, options):
     """Judge all markers of a frame against the predicted pose; goals are eased and exchanged in place."""
-    refused = 0
+    seen, refused = 0, 0
     for s in range(len(segments)):
-        refused += screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)[1]
-    if refused > 1:
+        found = screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
+        seen, refused = seen + found[0], refused + found[1]
+    if refused > MOST * seen:  # the prediction is wrong, not they
+        for i in range(len(flags)):
+            if flags[i] == tp.REJECTED:
+                flags[i] = tp.USED
+    elif refused > 1:
         exchange(w, table, numbers, memory, flags, goal, ahead)
     for s in range(len(segments)):
         readmit(segments, memory, flags, s, options.dt)
