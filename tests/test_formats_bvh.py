@@ -285,7 +285,7 @@ def test_other_places_are_refused(tmp_path: Path) -> None:
         "none.bvh": "no such file",
         "a.xyz": r"unknown suffix '\.xyz'.*\.bvh, \.amc, \.asf",
         "a.fbx": "Blender",
-        "a.c3d": "not supported yet",
+        "a.c3d": "holds markers, not motions; follow them with: sixpoint track",
         "a.csv": "does not hold motions",
     }.items():
         with pytest.raises(FormatError, match=message):

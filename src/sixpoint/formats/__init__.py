@@ -1,4 +1,4 @@
-"""Files to motions and targets, and back; ``load`` and ``save`` choose by suffix.
+"""Files to motions, targets and markers, and back; ``load`` and ``save`` choose by suffix.
 
 Degrees, inches, centimetres and Z-up worlds exist only in this room: what comes out is in metres, radians
 and Y up, and what goes into a file is in the unit and axes of the file it once came from. Reading raises
@@ -18,16 +18,34 @@ from sixpoint.formats.amc import find_skeleton, read_acclaim
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.bvh import read_bvh
 from sixpoint.formats.bvh_write import format_bvh
+from sixpoint.formats.markers import (
+    MARKER_OUTPUTS,
+    MARKER_SUFFIXES,
+    holds_markers,
+    load_markers,
+    save_markers,
+)
 from sixpoint.formats.npz import format_npz, read_npz
 from sixpoint.formats.space import detect_space, enter_world, leave_world, parse_unit, parse_up
 from sixpoint.formats.tables import format_csv, read_csv
 
-__all__ = ["find_skeleton", "load", "load_targets", "save", "save_targets"]
+__all__ = [
+    "MARKER_OUTPUTS",
+    "MARKER_SUFFIXES",
+    "find_skeleton",
+    "holds_markers",
+    "load",
+    "load_markers",
+    "load_targets",
+    "save",
+    "save_markers",
+    "save_targets",
+]
 
 MOTION_SUFFIXES = (".bvh", ".amc", ".asf")
 TARGET_SUFFIXES = (".csv", ".npz")
 
-_NOT_YET = (".c3d", ".trc", ".glb", ".gltf", ".vrm", ".usd", ".usda", ".usdc")
+_NOT_YET = (".glb", ".gltf", ".vrm", ".usd", ".usda", ".usdc")
 _FBX = (
     "FBX files are not read; convert it, e.g. in Blender: File > Import > FBX, then "
     "File > Export > Motion Capture (.bvh)"
@@ -171,6 +189,9 @@ def _check_suffix(path: Path, known: tuple[str, ...], what: str) -> str:
         raise FormatError(path, f"{suffix} files are planned but not supported yet; {formats}")
     if suffix == ".asf":
         raise FormatError(path, "save as .amc: the .asf is written beside it")
+    if suffix in MARKER_SUFFIXES and suffix not in TARGET_SUFFIXES:
+        message = f"a {suffix} file holds markers, not {what.split(',')[0]}; follow them with: sixpoint track"
+        raise FormatError(path, f"{message}; {formats}")
     if suffix in (*MOTION_SUFFIXES, *TARGET_SUFFIXES):
         raise FormatError(path, f"a {suffix} file does not hold {what.split(',')[0]}; {formats}")
     raise FormatError(path, f"unknown suffix {suffix!r}; {formats}")
