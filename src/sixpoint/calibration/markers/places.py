@@ -1,4 +1,4 @@
-"""Where each marker of a recording is expected on the built-in figure: joints, offsets, and how sure that is."""
+"""Where each marker of a recording is expected on the built-in figure, and how sure that is."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from sixpoint.calibration.markers.places import Places
 
 Array = NDArray[np.float64]
 
-INDEPENDENT = 25.0  # frames
+INDEPENDENT = 10.0  # frames
 OUTLIER = 0.04  # residuals beyond count less and less [m]
 LIMIT_STD = np.radians(3.0)  # how softly a hinge stops
 

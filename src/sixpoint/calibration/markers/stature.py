@@ -1,4 +1,4 @@
-"""How tall a person is, from distances between markers that hardly change; and whether the unit can be right."""
+"""How tall a person is, from distances between markers that hardly change; whether the unit can be right."""
 
 from __future__ import annotations
 
@@ -57,9 +57,8 @@ def estimate_stature(found: MarkerRoles, observed: Array, kinematics: Kinematics
     if not STATURES[0] <= stature <= STATURES[1]:
         fits = [name for unit, name in UNITS.items() if STATURES[0] <= stature * unit <= STATURES[1]]
         hint = f"; if the file is in {' or '.join(fits)}, say so with unit=" if fits else ""
-        raise TargetError(
-            f"these markers would be a person of {stature:.3g} m; expected {STATURES[0]} to {STATURES[1]} m{hint}"
-        )
+        expected = f"expected {STATURES[0]} to {STATURES[1]} m"
+        raise TargetError(f"these markers would be a person of {stature:.3g} m; {expected}{hint}")
     return stature
 
 
