@@ -98,6 +98,7 @@ class TrackingEngine:
             *state,
             np.zeros((len(low.lowered.index), 5)),
             np.empty_like(state.pose),
+            np.empty_like(state.pose),
             np.zeros((self._markers, 4)),
             np.zeros((6, 3)),
             np.zeros((columns + 1, columns)),

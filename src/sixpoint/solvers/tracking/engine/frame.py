@@ -11,7 +11,7 @@ from sixpoint.solvers.prioritized.engine.limits import hold_limits
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, unpack_model, unpack_scratch
 from sixpoint.solvers.prioritized.engine.step import scale_step
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.engine.clusters import build_cluster
+from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
 from sixpoint.solvers.tracking.engine.step import solve_step
@@ -20,6 +20,9 @@ COAST = 0.12  # what no marker sees goes on for about so long [s]
 SMOOTH = 0.02  # rates of change are means over about so long [s]
 SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
 TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
+PENALTY = 100.0  # weight of what exceeds a tolerance
+WORSE, SLACK = 1.01, 1e-5  # a merit beyond this share and sum [m^2] is worse: the posture moves a little
+STIFFEST = 1.0  # largest damping [m]
 CAP = 6.0  # largest speed towards the posture [rad/s]
 
 
@@ -87,30 +90,67 @@ def copy_rows(source, target):
 
 
 @helper
+def merit(w, clusters, numbers, memory, flags, goal, tolerance):
+    """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
+    total = 0.0
+    for k in range(len(clusters)):
+        joint, first, count = clusters[k, tp.JOINT], clusters[k, tp.FIRST], clusters[k, tp.COUNT]
+        weight, centre = 0.0, (0.0, 0.0, 0.0)
+        for i in range(first, first + count):
+            if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
+                local = place_in_joint(numbers, memory, i)
+                place = vec.add(vec.load(w.position, joint), qt.mul_vec(qt.load(w.rotation, joint), local))
+                error = vec.sub(vec.load(goal, i), place)
+                weight += numbers[i, tp.WEIGHT]
+                centre = vec.madd(centre, numbers[i, tp.WEIGHT], error)
+                total += numbers[i, tp.WEIGHT] * vec.dot(error, error)
+        if weight > 0.0 and clusters[k, tp.LAST] == 0:
+            beyond = max(vec.norm(centre) / weight - tolerance, 0.0)
+            total += PENALTY * weight * beyond * beyond
+    return total
+
+
+@helper
 def improve(
-    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, rest, tensor, normal, o
-):
-    """Iterate one frame; returns the iterations."""
+    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, rest, tensor,
+    normal, damping, o,
+):  # fmt: skip
+    """Iterate one frame; returns the iterations and the damping that the next one begins with.
+
+    Where a step makes things worse, limits that it ran into made it so: it is taken back, and the next one is
+    more damped (Levenberg, Marquardt).
+    """
     step = len(w.row) + 1
     settings = Settings(o.limits, 1.0, TURN, SHIFT, 1e-4, o.posture, CAP * o.dt, False, o.most, 1, 1)
     if o.limits:
         hold_limits(m, balls, state)
+    compute_world(m, w, state)
+    here = merit(w, clusters, numbers, memory, flags, goal, o.tolerance)
     for n in range(o.most):
-        compute_world(m, w, state)
         for k in range(len(clusters)):
             build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
         posture = -1
         if o.posture > 0.0 and (n == 0 or o.cold):
             posture = step + 1
             posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
-        solve_step(m, w, balls, index, clusters, forced, state, o.limits, o, posture, normal)
+        solve_step(m, w, balls, index, clusters, forced, state, damping, o, posture, normal)
         scale_step(m, w, settings, step, 1.0)
+        copy_rows(state, old)
         retract(m, w, state, step)
         if o.limits:
             hold_limits(m, balls, state)
+        compute_world(m, w, state)
+        there = merit(w, clusters, numbers, memory, flags, goal, o.tolerance)
+        if there > WORSE * here + SLACK:
+            copy_rows(old, state)
+            compute_world(m, w, state)
+            damping = min(4.0 * damping, STIFFEST)
+            continue
+        here = there
+        damping = max(0.5 * damping, o.damping)
         if largest_step(m, w, step) < (1e-3 if o.cold else SMALL):
-            return n + 1
-    return o.most
+            return n + 1, damping
+    return o.most, damping
 
 
 @entry
@@ -132,6 +172,7 @@ def track_markers(
     memory,
     forced,
     before,
+    old,
     ahead,
     tensor,
     normal,
@@ -165,10 +206,10 @@ def track_markers(
             predict(m, state, speed, o.dt)
             compute_world(m, w, state)
             screen(w, table, segments, numbers, memory, flags[f], goal, ahead, o)
-        iterations[f] = improve(
-            m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, rest, tensor, normal, o
-        )
-        compute_world(m, w, state)
+        iterations[f], speed[joints, 3] = improve(
+            m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old, rest,
+            tensor, normal, max(speed[joints, 3], o.damping), o,
+        )  # fmt: skip
         if not o.cold:
             learn_distances(w, table, segments, numbers, memory, flags[f], goal, o.dt)
             update_speed(m, state, before, speed, table, flags[f], seen, o.dt)

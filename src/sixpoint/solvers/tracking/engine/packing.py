@@ -60,7 +60,8 @@ class Memory(NamedTuple):
 
     Attributes:
         state: (2 J + 1, 4) local rotations, base position, hinge angles, as in prioritized IK.
-        speed: (2 J + 1, 4) their rates of change [rad/s, m/s].
+        speed: (2 J + 1, 4) their rates of change [rad/s, m/s]; the last number of the base's row is the damping
+            [m] that the next frame begins with.
         marker: (M, 12) per marker: distance from its place [m] in the joint's frame, what is left of a jump
             when it came back [m] and how fast that fades [1/s], times since it was used and since it is
             refused [s], whether its distance is known, and how much of its distance counts (0 to 1).

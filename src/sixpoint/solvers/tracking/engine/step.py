@@ -169,7 +169,7 @@ def force_clusters(w, index, clusters, forced, tolerance, step):
 
 
 @helper
-def solve_step(m, w, balls, index, clusters, forced, state, limits, o, posture, normal):
+def solve_step(m, w, balls, index, clusters, forced, state, damping, o, posture, normal):
     """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again."""
     fixed = len(w.row)
     step, basis = fixed + 1, fixed + 3 + w.small.shape[1]
@@ -181,9 +181,9 @@ def solve_step(m, w, balls, index, clusters, forced, state, limits, o, posture, 
     for _ in range(ROUNDS):
         linear.copy(w.rows, step, fixed)
         size = solve_equalities(m, w, index, forced, fixed, basis) if held else 0
-        least_squares(m, w, index, fixed, basis, size, held, o.damping, posture, normal)
+        least_squares(m, w, index, fixed, basis, size, held, damping, posture, normal)
         added = force_clusters(w, index, clusters, forced, o.tolerance, step)
-        if limits and lock_violations(m, w, balls, state, step, fixed):
+        if o.limits and lock_violations(m, w, balls, state, step, fixed):
             added = True
         if not added:
             return
