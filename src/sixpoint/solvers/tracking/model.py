@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
+from sixpoint.body.marker_model import MarkerModel
 from sixpoint.errors import FigureError
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.blocks import Block, lower_task
@@ -17,7 +18,7 @@ from sixpoint.solvers.prioritized.engine import packing as pk
 from sixpoint.solvers.prioritized.model import Lowered, lower_blocks
 from sixpoint.solvers.prioritized.tasks import FlextTask, PostureTask
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.priorities import check_priorities, find_parts
+from sixpoint.solvers.tracking.priorities import check_priorities, check_tolerances, find_parts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -37,7 +38,6 @@ class LoweredMarkers:
         segments: (S, 3) joint, first marker, number of markers.
         clusters: (K, 6) joint, first marker, number, blocks of rows.
         numbers: (M, 5) offset in the joint's anatomical frame [m], weight, spread [m].
-        limbs: Number of FLEXT limbs.
         parts: The part of each marker, in the caller's order.
     """
 
@@ -47,7 +47,6 @@ class LoweredMarkers:
     segments: Index
     clusters: Index
     numbers: Array
-    limbs: int
     parts: tuple[str, ...]
 
 
@@ -62,24 +61,23 @@ def carrier_of(body: Articulation, joint: int, offset: Array) -> tuple[int, Arra
 
 def lower_markers(
     body: Articulation,
-    figure: Figure,
-    joints: Index,
-    offsets: Array,
-    spread: Array,
+    model: MarkerModel,
     priorities: Mapping[str, int] | None,
+    tolerances: Mapping[str, float] | None,
     flext: bool,
     limits: bool,
 ) -> LoweredMarkers:
-    """Lower M markers at ``offsets`` (M, 3) [m] in the rig frames of ``joints`` (M,).
+    """Lower a body and the markers on it.
 
     Raises:
         FigureError: There is no marker, or one sits above the pelvis.
     """
+    figure, joints = model.figure, model.joints
     if len(joints) == 0:
         raise FigureError("there are no markers to follow")
-    places = rot.mul_vec(figure.neutral[joints], offsets)
+    places = rot.mul_vec(figure.neutral[joints], model.offsets)
     parts = find_parts(figure, joints, figure.rest_positions[joints] + places)
-    levels_of = check_priorities(priorities)
+    levels_of, bands = check_priorities(priorities), check_tolerances(tolerances)
     carried = [carrier_of(body, int(j), p) for j, p in zip(joints, places, strict=True)]
     carriers = np.array([joint for joint, _ in carried])
     inside = set(body.tree.subtree(body.base).tolist())
@@ -87,7 +85,7 @@ def lower_markers(
         raise FigureError("a marker sits above the pelvis, on what does not move")
     level = np.array([levels_of[part] for part in parts])
     order = np.lexsort((level, carriers))
-    usual = np.where(np.isfinite(spread), spread, USUAL)
+    usual = np.where(np.isfinite(model.spread), model.spread, USUAL)
     numbers = np.zeros((len(order), 5))
     numbers[:, :3] = np.array([place for _, place in carried])[order]
     numbers[:, tp.WEIGHT] = (USUAL**2 / (USUAL**2 + usual**2) * 2.0)[order]
@@ -95,8 +93,11 @@ def lower_markers(
     segments, table = _group(carriers[order]), np.zeros((len(order), 2), np.int64)
     for s, (joint, first, count) in enumerate(segments):
         table[first : first + count] = joint, s
-    lowered, clusters, limbs = _lower_clusters(body, figure, carriers[order], level[order], numbers, flext, limits)
-    return LoweredMarkers(lowered, order, table, segments, clusters, numbers, limbs, parts)
+    lowered, clusters = _lower_clusters(body, figure, carriers[order], level[order], numbers, flext, limits)
+    for cluster in clusters:
+        band = bands[parts[order[cluster[tp.FIRST]]]]
+        lowered.values[cluster[tp.MOVE], pk.TOLERANCE] = band
+    return LoweredMarkers(lowered, order, table, segments, clusters, numbers, parts)
 
 
 def _group(keys: Index) -> Index:
@@ -107,7 +108,7 @@ def _group(keys: Index) -> Index:
 
 def _lower_clusters(
     body: Articulation, figure: Figure, carriers: Index, level: Index, numbers: Array, flext: bool, limits: bool
-) -> tuple[Lowered, Index, int]:
+) -> tuple[Lowered, Index]:
     """Blocks of all clusters: FLEXT or three rows for the centre, three rows for turns."""
     groups = _group(carriers * (level.max() + 1) + level)
     ends = _flext_clusters(body, figure, carriers, level, groups) if flext else {}
@@ -130,7 +131,7 @@ def _lower_clusters(
     for k, (_, first, count) in enumerate(groups):
         clusters[k] = carriers[first], first, count, places[k, 1], places[k, 0], level[first] == last
     lowered = lower_blocks(body, [entry[2] for entry in blocks], PostureTask(), [])
-    return lowered, clusters, len(ends)
+    return lowered, clusters
 
 
 def _plain(kind: int, joint: int, level: int) -> Block:

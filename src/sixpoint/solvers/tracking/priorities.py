@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 PRIORITIES: Mapping[str, int] = {"feet": 0, "pelvis": 1, "hands": 2, "head": 3, "rest": 4}
 """Level of each part's markers; 0 is the most important."""
 
+TOLERANCES: Mapping[str, float] = {"feet": 0.02, "pelvis": 0.02, "hands": 0.02, "head": 0.02}
+"""How far the centre of a part's markers may be off before it is held at its level [m]."""
+
 NEAR = 0.3
 """Markers this close to a wrist or ankle, over the length of the segment above, are the hand's or foot's."""
 
@@ -33,6 +36,22 @@ def check_priorities(priorities: Mapping[str, int] | None) -> dict[str, int]:
         if not (np.isfinite(level) and int(level) == level and level >= 0):
             raise SixpointError(f"the level of {part!r} is a whole number from 0, got {level}")
     return {**PRIORITIES, **given}
+
+
+def check_tolerances(tolerances: Mapping[str, float] | None) -> dict[str, float]:
+    """The tolerances of all parts: those given, else the usual ones; "rest" has none.
+
+    Raises:
+        SixpointError: A part does not exist, or a tolerance is not positive.
+    """
+    given = dict(tolerances or {})
+    unknown = [part for part in given if part not in TOLERANCES]
+    if unknown:
+        raise SixpointError(f"no tolerance of {listed(unknown)}; parts are: {listed(TOLERANCES)}")
+    for part, value in given.items():
+        if not value > 0:
+            raise SixpointError(f"the tolerance of {part!r} is a positive number [m], got {value}")
+    return {**TOLERANCES, **given, "rest": float("inf")}
 
 
 def find_parts(figure: Figure, joints: NDArray[np.int64], places: Array) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from sixpoint.solvers.prioritized.full_body import attractor_state
 from sixpoint.solvers.prioritized.tasks import PostureTask
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.model import lower_markers
+from sixpoint.solvers.tracking.priorities import PRIORITIES
 from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine
 from sixpoint.solvers.tracking.start import place_base, refuse_strays
 from sixpoint.solvers.tracking.two_sided import blend
@@ -87,8 +88,8 @@ class MarkerTracker:
         gate: A marker is refused where it is farther than about this from where it should be [m]; what it
             usually is off by, and what a prediction may miss, are added. Infinity refuses none.
         damping: Lever below which a turn is damped [m].
-        tolerance: The centre of hands, feet, pelvis and head markers comes within this of where it should
-            be, most important part first, before the markers below count [m].
+        tolerances: Part -> how far the centre of its markers may be off before it is held there, whatever
+            that costs the parts below [m]; 2 cm by default. Within it all markers count alike.
 
     Raises:
         SixpointError: An option makes no sense; the message says what would.
@@ -104,24 +105,22 @@ class MarkerTracker:
         iterations: int = 3,
         gate: float = 0.04,
         damping: float = 0.05,
-        tolerance: float = 0.02,
+        tolerances: Mapping[str, float] | None = None,
     ) -> None:
         if not (int(iterations) == iterations and iterations >= 1):
             raise SixpointError(f"iterations are a whole number from 1, got {iterations}")
-        for name, value in (("gate", gate), ("damping", damping), ("tolerance", tolerance)):
+        for name, value in (("gate", gate), ("damping", damping)):
             if not value > 0:
                 raise SixpointError(f"the {name} is a positive number [m], got {value}")
         self.model = model
         self.body = Articulation.of(model.figure, model.figure.full_dofs())
         low = [
-            lower_markers(
-                self.body, model.figure, model.joints, model.offsets, model.spread, levels, limbs, limits
-            )
-            for levels, limbs in ((priorities, flext), (dict.fromkeys(_parts(), 0), False))
+            lower_markers(self.body, model, levels, tolerances, limbs, limits)
+            for levels, limbs in ((priorities, flext), (dict.fromkeys(PRIORITIES, 0), False))
         ]
         self.parts = low[0].parts
         self._engine, self._starter = TrackingEngine(low[0]), TrackingEngine(low[1])
-        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping, tolerance)
+        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping)
         self._rest = attractor_state(self.body, PostureTask())
 
     @property
@@ -266,12 +265,6 @@ class MarkerTracker:
     def _options_at(self, dt: float) -> tp.Options:
         dt = min(max(dt, 1e-4), 0.5) if np.isfinite(dt) else 0.01
         return self._options._replace(dt=dt, posture=1.0 - np.exp(-dt / IDLE))
-
-
-def _parts() -> tuple[str, ...]:
-    from sixpoint.solvers.tracking.priorities import PRIORITIES
-
-    return tuple(PRIORITIES)
 
 
 def _enough(frame: Array) -> bool:

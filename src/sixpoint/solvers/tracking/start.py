@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.rigid import fit_rigid
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.tracking.engine import packing as tp
 
@@ -14,18 +15,6 @@ Array = NDArray[np.float64]
 
 STRAY = 0.1  # a marker that is farther than this from its place in a first frame is no one's [m]
 TIMES = 5.0  # unless others are as far: this times their median
-
-
-def fit_rigid(local: Array, world: Array) -> tuple[Array, Array]:
-    """Rotation (4,) and shift (3,) [m] that take points (n, 3) nearest to others (least squares).
-
-    Reference: Kabsch 1976; Umeyama 1991.
-    """
-    a, b = local.mean(axis=0), world.mean(axis=0)
-    u, _, vt = np.linalg.svd((world - b).T @ (local - a))
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0])
-    turn = u @ flip @ vt
-    return rot.from_axes(*turn.T), np.asarray(b - turn @ a)
 
 
 def place_base(body: Articulation, model: MarkerModel, markers: Array) -> Array:

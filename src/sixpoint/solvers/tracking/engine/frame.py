@@ -5,6 +5,7 @@ from math import exp
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.prioritized.engine import packing as pk
 from sixpoint.solvers.prioritized.engine.frame import posture_wish
 from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges, retract
 from sixpoint.solvers.prioritized.engine.limits import hold_limits
@@ -90,7 +91,7 @@ def copy_rows(source, target):
 
 
 @helper
-def merit(w, clusters, numbers, memory, flags, goal, tolerance):
+def merit(w, values, clusters, numbers, memory, flags, goal):
     """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
     total = 0.0
     for k in range(len(clusters)):
@@ -105,6 +106,7 @@ def merit(w, clusters, numbers, memory, flags, goal, tolerance):
                 centre = vec.madd(centre, numbers[i, tp.WEIGHT], error)
                 total += numbers[i, tp.WEIGHT] * vec.dot(error, error)
         if weight > 0.0 and clusters[k, tp.LAST] == 0:
+            tolerance = values[clusters[k, tp.MOVE], pk.TOLERANCE]
             beyond = max(vec.norm(centre) / weight - tolerance, 0.0)
             total += PENALTY * weight * beyond * beyond
     return total
@@ -125,7 +127,7 @@ def improve(
     if o.limits:
         hold_limits(m, balls, state)
     compute_world(m, w, state)
-    here = merit(w, clusters, numbers, memory, flags, goal, o.tolerance)
+    here = merit(w, values, clusters, numbers, memory, flags, goal)
     for n in range(o.most):
         for k in range(len(clusters)):
             build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
@@ -133,14 +135,14 @@ def improve(
         if o.posture > 0.0 and (n == 0 or o.cold):
             posture = step + 1
             posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
-        solve_step(m, w, balls, index, clusters, forced, state, damping, o, posture, normal)
+        solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal)
         scale_step(m, w, settings, step, 1.0)
         copy_rows(state, old)
         retract(m, w, state, step)
         if o.limits:
             hold_limits(m, balls, state)
         compute_world(m, w, state)
-        there = merit(w, clusters, numbers, memory, flags, goal, o.tolerance)
+        there = merit(w, values, clusters, numbers, memory, flags, goal)
         if there > WORSE * here + SLACK:
             copy_rows(old, state)
             compute_world(m, w, state)

@@ -32,17 +32,16 @@ class Options(NamedTuple):
     gate: float
     posture: float
     damping: float
-    tolerance: float
 
 
 def pack_options(options):
-    """Options as eight numbers."""
+    """Options as seven numbers."""
     return [float(value) for value in options]
 
 
 @helper
 def unpack_options(numbers):
-    """Options from eight numbers."""
+    """Options from seven numbers."""
     return Options(
         numbers[0] > 0.0,
         int(numbers[1]),
@@ -51,7 +50,6 @@ def unpack_options(numbers):
         numbers[4],
         numbers[5],
         numbers[6],
-        numbers[7],
     )
 
 

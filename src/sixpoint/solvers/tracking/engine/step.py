@@ -145,7 +145,7 @@ def solve_equalities(m, w, index, forced, fixed, basis):
 
 
 @helper
-def force_clusters(w, index, clusters, forced, tolerance, step):
+def force_clusters(w, index, values, clusters, forced, step):
     """Make equalities of clusters that the step leaves farther off than their tolerance; whether there are."""
     found = False
     for k in range(len(clusters)):
@@ -153,7 +153,7 @@ def force_clusters(w, index, clusters, forced, tolerance, step):
         if clusters[k, tp.LAST] > 0 or w.block[b, 2] != EQUAL or forced[b, 4] > 0.0:
             continue
         r, weight = index[b, pk.FIRST], w.block[b, 3]
-        square = 0.0
+        square, tolerance = 0.0, values[b, pk.TOLERANCE]
         for c in range(3):
             forced[b, c] = (w.row[r + c, 0] - linear.dot(w.rows, r + c, step)) / weight
             square += forced[b, c] * forced[b, c]
@@ -169,7 +169,7 @@ def force_clusters(w, index, clusters, forced, tolerance, step):
 
 
 @helper
-def solve_step(m, w, balls, index, clusters, forced, state, damping, o, posture, normal):
+def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal):
     """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again."""
     fixed = len(w.row)
     step, basis = fixed + 1, fixed + 3 + w.small.shape[1]
@@ -182,7 +182,7 @@ def solve_step(m, w, balls, index, clusters, forced, state, damping, o, posture,
         linear.copy(w.rows, step, fixed)
         size = solve_equalities(m, w, index, forced, fixed, basis) if held else 0
         least_squares(m, w, index, fixed, basis, size, held, damping, posture, normal)
-        added = force_clusters(w, index, clusters, forced, o.tolerance, step)
+        added = force_clusters(w, index, values, clusters, forced, step)
         if o.limits and lock_violations(m, w, balls, state, step, fixed):
             added = True
         if not added:
