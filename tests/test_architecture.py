@@ -32,6 +32,7 @@ ALLOWED = {
         "samples",
         "datasets",
         "study",
+        "signals",
         "viewer",
         "body",
         "errors",

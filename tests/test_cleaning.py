@@ -65,7 +65,7 @@ def test_short_gaps_are_filled_close_to_the_truth():
 
 
 def test_a_ghost_is_found_and_fast_people_are_not():
-    """A marker that is elsewhere for five frames; a foot at 15 m/s and one that is moved for good are none."""
+    """A marker that jumps away for five frames is; a foot at 15 m/s and one moved for good are not."""
     points = moving()
     points[120:125, 1] += [0.6, 0, 0]
     points[200, 2] += [0, 0.4, 0]

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
+from sixpoint.body.joint_angles import JointAngles
+from sixpoint.body.markers import Markers
+from sixpoint.body.motion import FileSpace, Motion
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.jobs.reading import Opened
 from sixpoint.jobs.solving import Solved
@@ -26,9 +29,8 @@ def describe_length(frames: int, rate: float) -> str:
     return f"{plural(frames, 'frame')} at {rate:g} Hz, {frames / rate:.2f} s"
 
 
-def describe_space(opened: Opened) -> list[Row]:
+def describe_space(space: FileSpace) -> list[Row]:
     """Unit and up axis of a file, and how they are known."""
-    space = opened.motion.space
     name = next((n for u, n in _UNITS.items() if math.isclose(u, space.unit, rel_tol=1e-6)), "")
     unit = f"{name} ({space.unit:.6g} m)" if name not in ("", "m") else f"{space.unit:.6g} m"
     guess = " (--unit to change)" if space.unit_source == "guessed" else ""
@@ -114,6 +116,18 @@ def describe_box(points: NDArray[np.float64]) -> str:
 def _shares(lost: NDArray[np.bool_]) -> str:
     counts = zip(EFFECTORS, lost.sum(axis=0), strict=True)
     return ", ".join(f"{name} in {plural(int(n), 'frame')}" for name, n in counts if n)
+
+
+def describe_content(content: Motion | Targets | Markers | JointAngles) -> str:
+    """What was converted, in two words."""
+    match content:
+        case Motion():
+            return f"{len(content.skeleton)} joints"
+        case Markers():
+            return plural(len(content.names), "marker")
+        case JointAngles():
+            return f"{len(content.names)} joint angles and coordinates"
+    return "six points"
 
 
 def describe_files(files: list[Path]) -> str:

@@ -5,29 +5,38 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 from cyclopts import Parameter
 
-from sixpoint.cli.options import Mapping, Rate, Skeleton, Unit, Up
+from sixpoint.cli.options import Layout, Mapping, Rate, Skeleton, Unit, Up
 from sixpoint.cli.screen import Screen
 
 if TYPE_CHECKING:
     from sixpoint.body.figure import Figure
+    from sixpoint.body.markers import Markers
     from sixpoint.body.skeleton import Skeleton as Rig
-    from sixpoint.jobs.info import MotionInfo, TargetsInfo
+    from sixpoint.jobs.info import MarkersInfo, MotionInfo, TargetsInfo
 
 
 def info(
-    file: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .asf) or six points (.csv, .npz).")],
+    file: Annotated[
+        Path,
+        Parameter(
+            help="A motion (.bvh, .amc, .asf), six points (.csv, .npz) or markers (.c3d, .trc, .csv, .npz, "
+            ".json)."
+        ),
+    ],
     /,
     *,
     tree: Annotated[bool, Parameter(negative="", help="Show the tree of joints.")] = False,
     skeleton: Skeleton = None,
     mapping: Mapping = None,
+    layout: Layout = None,
     unit: Unit = None,
     up: Up = None,
     rate: Rate = None,
 ) -> None:
-    """Say what a file holds: frames, units, joints, and which joint is which part of the body.
+    """Say what a file holds: frames, units, joints or markers, and which is which part of the body.
 
     For example:
 
@@ -35,13 +44,17 @@ def info(
     sixpoint info 17_10.amc
     sixpoint info avatar.bvh --tree
     sixpoint info points.csv
+    sixpoint info gait.c3d
     ```
     """
-    from sixpoint.jobs.info import TargetsInfo, inspect
+    from sixpoint.jobs.info import MarkersInfo, TargetsInfo, inspect
     from sixpoint.jobs.reading import Reading
 
-    found = inspect(file, reading=Reading(skeleton, unit, up, rate), mapping=mapping)
+    found = inspect(file, reading=Reading(skeleton, unit, up, rate), mapping=mapping, layout=layout)
     screen = Screen()
+    if isinstance(found, MarkersInfo):
+        _show_markers(screen, found)
+        return
     if isinstance(found, TargetsInfo):
         _show_targets(screen, found)
     else:
@@ -60,7 +73,7 @@ def _show_motion(screen: Screen, found: MotionInfo, tree: bool) -> None:
         [
             ("length", describe.describe_length(len(motion), motion.rate)),
             *describe.describe_skeleton_file(opened),
-            *describe.describe_space(opened),
+            *describe.describe_space(motion.space),
             ("joints", f"{len(rig)}, and {describe.plural(len(rig.site_names), 'end site')}"),
             ("freedom", f"{declared}; {_describe_moving(motion.moving, rig)}"),
             ("root moves", describe.describe_box(motion.root_positions)),
@@ -122,3 +135,54 @@ def _show_targets(screen: Screen, found: TargetsInfo) -> None:
         share = targets.tracked[:, k].mean()
         rows.append([name, f"{100 * share:.1f} %", describe.describe_box(targets.positions[:, k])])
     screen.table(("effector", "tracked", "where"), rows, texts=(0, 2))
+
+
+def _show_markers(screen: Screen, found: MarkersInfo) -> None:
+    from sixpoint.cli import describe
+    from sixpoint.errors import listed
+
+    markers, roles = found.markers, found.roles
+    screen.say(f"{found.path}: {describe.plural(len(markers.names), 'marker')}", style="bold")
+    taken = f"{roles.set_name}, which names {100 * roles.share:.0f} % of the labels"
+    rows = [
+        ("length", describe.describe_length(len(markers), markers.rate)),
+        *describe.describe_space(markers.space),
+        ("where", describe.describe_box(markers.positions)),
+        ("set", taken if roles.roles else "unknown: give the labels' roles by --layout"),
+        ("roles", f"{len(roles.roles)} of {describe.plural(len(markers.names), 'marker')}"),
+        ("unknown", listed(roles.unknown, 20) or "none"),
+        ("residuals", _describe_residuals(markers)),
+        ("events", _describe_events(markers)),
+        ("ghosts", _describe_ghosts(found)),
+    ]
+    screen.rows([("subject", roles.subject), *rows] if roles.subject else rows)
+    screen.say("markers, the worst seen first", style="bold")
+    table = []
+    for k in sorted(range(len(found.gaps)), key=lambda k: (found.gaps[k].seen, -found.gaps[k].longest)):
+        gap, name = found.gaps[k], markers.names[k]
+        span = f"{gap.first} to {gap.last}" if gap.first >= 0 else "never seen"
+        numbers = [f"{100 * gap.seen:.1f} %", str(gap.count), f"{gap.longest / markers.rate:.2f} s", span]
+        table.append([name, roles.roles.get(name, ""), roles.segments.get(name, ""), *numbers])
+    screen.table(("marker", "role", "segment", "seen", "gaps", "longest", "frames"), table, texts=(0, 1, 2))
+
+
+def _describe_residuals(markers: Markers) -> str:
+    if markers.residuals is None:
+        return "none"
+    known = markers.residuals[np.isfinite(markers.residuals)]
+    return f"mean {1e3 * known.mean():.2f} mm, worst {1e3 * known.max():.2f} mm" if len(known) else "none"
+
+
+def _describe_events(markers: Markers) -> str:
+    from sixpoint.errors import listed
+
+    said = [f"{event.context} {event.label} {event.time:.2f} s".strip() for event in markers.events]
+    return listed(said, 12) or "none"
+
+
+def _describe_ghosts(found: MarkersInfo) -> str:
+    from sixpoint.errors import listed
+
+    names = found.markers.names
+    said = [f"{names[g.point]} in frames {g.start} to {g.stop - 1} ({g.speed:.0f} m/s)" for g in found.ghosts]
+    return listed(said, 8) or "none"

@@ -23,8 +23,12 @@ Unit = Annotated[
     ),
 ]
 Up = Annotated[
-    Literal["y", "z"] | None,
-    Parameter(help="Up axis of the file; by default guessed from the posture for .bvh, y for .amc."),
+    Literal["y", "z", "-y", "-z", "x", "-x"] | None,
+    Parameter(
+        help="Up axis of the file; by default guessed from the posture for .bvh and markers, y for .amc. "
+        "All but y and z are for markers only.",
+        allow_leading_hyphen=True,
+    ),
 ]
 Rate = Annotated[
     float | None, Parameter(help="Frames per second, in place of the file's. An .amc states none: 120.")
@@ -32,6 +36,13 @@ Rate = Annotated[
 Mapping = Annotated[
     Path | None,
     Parameter(help='TOML table of roles and joints, for a rig with unusual names: l_hip = "LeftThigh".'),
+]
+Layout = Annotated[
+    str | None,
+    Parameter(
+        help='TOML file that says what the markers\' labels mean (`LASI = "l_asis"`), or `markers24`. '
+        "By default the labels are looked for in the known marker sets."
+    ),
 ]
 LimitsFile = Annotated[
     Path | None, Parameter(name="--limits", help="TOML table of joint limits in place of the shipped one.")

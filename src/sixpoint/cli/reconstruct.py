@@ -132,7 +132,7 @@ def _show(screen: Screen, file: Path, done: Reconstruction, stature: float | Non
                 *describe.describe_skeleton_file(done.opened),
                 ("rig", joints if done.errors else f"{joints} of {done.opened.motion.name}"),
                 *describe.describe_figure(done.figure),
-                *describe.describe_space(done.opened),
+                *describe.describe_space(done.opened.motion.space),
             ]
         )
     errors = describe.describe_errors(done.errors) if done.errors else []

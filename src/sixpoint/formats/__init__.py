@@ -1,4 +1,4 @@
-"""Files to motions, targets and markers, and back; ``load`` and ``save`` choose by suffix.
+"""Files to motions, targets and markers, and back; joint angles to files. The suffix says which format.
 
 Degrees, inches, centimetres and Z-up worlds exist only in this room: what comes out is in metres, radians
 and Y up, and what goes into a file is in the unit and axes of the file it once came from. Reading raises
@@ -15,6 +15,7 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats.acclaim_write import format_amc, format_asf, plan_bones
 from sixpoint.formats.amc import find_skeleton, read_acclaim
+from sixpoint.formats.angles import ANGLE_SUFFIXES, save_angles
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.bvh import read_bvh
 from sixpoint.formats.bvh_write import format_bvh
@@ -30,6 +31,7 @@ from sixpoint.formats.space import detect_space, enter_world, leave_world, parse
 from sixpoint.formats.tables import format_csv, read_csv
 
 __all__ = [
+    "ANGLE_SUFFIXES",
     "MARKER_OUTPUTS",
     "MARKER_SUFFIXES",
     "find_skeleton",
@@ -38,6 +40,7 @@ __all__ = [
     "load_markers",
     "load_targets",
     "save",
+    "save_angles",
     "save_markers",
     "save_targets",
 ]

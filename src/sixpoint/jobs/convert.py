@@ -1,19 +1,32 @@
-"""Convert between motion formats, take the six points of a motion, convert between target formats."""
+"""Convert between formats of motions, targets and markers; take six points or joint angles of a motion."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sixpoint.body.figure import Figure
+from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
+from sixpoint.body.markers import Markers
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError
-from sixpoint.formats import TARGET_SUFFIXES, save, save_targets
-from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
+from sixpoint.formats import (
+    ANGLE_SUFFIXES,
+    MARKER_OUTPUTS,
+    TARGET_SUFFIXES,
+    holds_markers,
+    save,
+    save_angles,
+    save_markers,
+    save_targets,
+)
+from sixpoint.jobs.reading import Reading, is_targets, open_markers, open_motion, open_targets
 from sixpoint.jobs.writing import check_output, keep_sources
+from sixpoint.signals.gaps import fill_gaps
+from sixpoint.signals.low_pass import low_pass
 
-OUTPUTS = (".bvh", ".amc", *TARGET_SUFFIXES)
+OUTPUTS = (".bvh", ".amc", ".mot", *TARGET_SUFFIXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +36,25 @@ class Conversion:
     Attributes:
         content: What was written.
         files: Where to.
+        notes: What was changed on the way.
     """
 
-    content: Motion | Targets
+    content: Motion | Targets | Markers | JointAngles
     files: list[Path]
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """What is done to markers; by default nothing.
+
+    Attributes:
+        fill: Longest gap that is filled [s].
+        low_pass: Cutoff of a zero-phase filter [Hz].
+    """
+
+    fill: float | None = None
+    low_pass: float | None = None
 
 
 def convert(
@@ -36,6 +64,8 @@ def convert(
     reading: Reading | None = None,
     mapping: Path | None = None,
     rotations: bool = False,
+    angles: bool = False,
+    cleaning: Cleaning | None = None,
     out_unit: str | None = None,
     out_up: str | None = None,
     force: bool = False,
@@ -43,21 +73,32 @@ def convert(
     """Convert one file into another; the suffixes say from what to what.
 
     Args:
-        source: A motion or targets.
-        out: A motion, or targets: of a motion its six points are taken.
+        source: A motion, targets or markers.
+        out: A motion, or targets: of a motion its six points are taken. Its joint angles for .mot.
         reading: How to read the source.
         mapping: A TOML table role -> joint name, to take the six points of an unusual rig.
         rotations: Keep the rotations of the six points.
-        out_unit: Unit of a written motion; by default the source's.
-        out_up: Up axis of a written motion; by default the source's.
+        angles: A .csv is to hold joint angles, not six points.
+        cleaning: What is done to markers.
+        out_unit: Unit of written motions or markers; by default the source's.
+        out_up: Up axis of written motions or markers; by default the source's.
         force: Overwrite existing files.
 
     Raises:
         SixpointError: Nothing was written; the message says why.
     """
     reading = reading or Reading()
-    from_targets, to_targets = is_targets(source), out.suffix.lower() in TARGET_SUFFIXES
+    suffix = out.suffix.lower()
+    if not source.is_dir() and holds_markers(source):
+        if angles or suffix not in MARKER_OUTPUTS:
+            raise FormatError(source, "markers hold no body; pose one with: sixpoint track")
+        return _convert_markers(source, out, reading, cleaning or Cleaning(), out_unit, out_up, force)
+    if cleaning is not None and cleaning != Cleaning():
+        raise FormatError(source, "only markers are filled and filtered: leave out --fill and --low-pass")
+    from_targets, to_targets = is_targets(source), suffix in TARGET_SUFFIXES
     files = check_output(out, OUTPUTS, force)
+    if angles or suffix == ".mot":
+        return _convert_to_angles(source, out, reading, mapping, from_targets, force)
     keep_sources(files, [source, reading.skeleton, mapping])
     if to_targets and (out_unit or out_up):
         raise FormatError(out, "targets are always in metres and Y up: leave out --out-unit and --out-up")
@@ -73,6 +114,61 @@ def convert(
         content = opened.motion
         save(content, out, force=force, unit=out_unit, up=out_up)
     return Conversion(content, files)
+
+
+def _convert_to_angles(
+    source: Path, out: Path, reading: Reading, mapping: Path | None, from_targets: bool, force: bool
+) -> Conversion:
+    if out.suffix.lower() not in ANGLE_SUFFIXES:
+        raise FormatError(out, "joint angles are written as .mot or .csv")
+    if from_targets:
+        raise FormatError(source, "six points hold no body; pose one with: sixpoint reconstruct")
+    keep_sources([out], [source, reading.skeleton, mapping])
+    opened = open_motion(source, reading)
+    content = compute_joint_angles(opened.motion, Figure.from_motion(opened.whole, mapping))
+    save_angles(content, out, force=force)
+    return Conversion(content, [out])
+
+
+def _convert_markers(
+    source: Path,
+    out: Path,
+    reading: Reading,
+    cleaning: Cleaning,
+    out_unit: str | None,
+    out_up: str | None,
+    force: bool,
+) -> Conversion:
+    files = check_output(out, MARKER_OUTPUTS, force)
+    keep_sources(files, [source])
+    markers, notes = clean_markers(open_markers(source, reading), cleaning)
+    save_markers(markers, out, force=force, unit=out_unit, up=out_up)
+    return Conversion(markers, files, notes)
+
+
+def clean_markers(markers: Markers, cleaning: Cleaning) -> tuple[Markers, list[str]]:
+    """Fill short gaps, then filter, as far as that is asked for; say what was changed.
+
+    Raises:
+        TargetError: A length or a cutoff is not possible.
+    """
+    positions, notes = markers.positions, []
+    if cleaning.fill is not None:
+        filled = fill_gaps(positions, markers.rate, cleaning.fill)
+        counts = filled.made.sum(axis=0)
+        worst = sorted(zip(counts.tolist(), markers.names, strict=True), reverse=True)[:5]
+        where = ", ".join(f"{name} {count}" for count, name in worst if count)
+        notes.append(f"filled {int(counts.sum())} samples" + (f" (most: {where})" if where else ""))
+        positions = filled.positions
+    if cleaning.low_pass is not None:
+        filtered = low_pass(positions, markers.rate, cleaning.low_pass)
+        kept = int(filtered.kept.sum())
+        notes.append(
+            f"filtered at {cleaning.low_pass:g} Hz"
+            + (f"; {kept} samples in stretches too short for it were left as they were" if kept else "")
+        )
+        positions = filtered.positions
+    return replace(markers, positions=positions), notes
 
 
 def _read_points(

@@ -1,14 +1,22 @@
-"""What a job reads: motions and targets, with the options of reading that all jobs share."""
+"""What a job reads: motions, targets and markers, with the options of reading that all jobs share."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sixpoint.body.markers import Markers
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
-from sixpoint.formats import MOTION_SUFFIXES, TARGET_SUFFIXES, find_skeleton, load, load_targets
+from sixpoint.formats import (
+    MOTION_SUFFIXES,
+    TARGET_SUFFIXES,
+    find_skeleton,
+    load,
+    load_markers,
+    load_targets,
+)
 
 ALL = slice(None)
 
@@ -100,6 +108,15 @@ def open_targets(path: Path, reading: Reading) -> Targets:
     targets = load_targets(path, rate=reading.rate)
     _check_frames(path, reading.frames, len(targets))
     return targets if reading.frames == ALL else targets.sliced(reading.frames)
+
+
+def open_markers(path: Path, reading: Reading) -> Markers:
+    """Read markers and take the frames asked for."""
+    if reading.skeleton is not None:
+        raise FormatError(path, "a skeleton file belongs to an .amc, not to markers: leave it out")
+    markers = load_markers(path, unit=reading.unit, up=reading.up, rate=reading.rate)
+    _check_frames(path, reading.frames, len(markers))
+    return markers if reading.frames == ALL else markers.sliced(reading.frames)
 
 
 def _check_frames(path: Path, frames: slice, count: int) -> None:

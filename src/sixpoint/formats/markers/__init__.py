@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from sixpoint.body.markers import Markers
+from sixpoint.body.targets import EFFECTORS
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.markers.archive import format_marker_npz, read_marker_npz
@@ -21,7 +22,7 @@ from sixpoint.formats.markers.c3d_write import format_c3d
 from sixpoint.formats.markers.landmarks import read_landmarks
 from sixpoint.formats.markers.raw import mend_names, open_gaps
 from sixpoint.formats.markers.space import AXES, enter_world, turn_from
-from sixpoint.formats.markers.tables import format_marker_csv, read_marker_csv
+from sixpoint.formats.markers.tables import find_marker_columns, format_marker_csv, read_marker_csv
 from sixpoint.formats.markers.trc import format_trc, read_trc
 from sixpoint.formats.space import UNITS, parse_unit
 
@@ -132,9 +133,6 @@ def holds_markers(path: Path) -> bool:
     try:
         if suffix == ".npz":
             return bool(read_marker_npz(path).names)
-        return not set(read_marker_csv(path).names) <= _SIX
+        return not find_marker_columns(path) <= set(EFFECTORS)
     except FormatError:
         return False
-
-
-_SIX = {"pelvis", "head", "l_wrist", "r_wrist", "l_ankle", "r_ankle"}

@@ -74,6 +74,20 @@ def read_marker_csv(path: Path) -> RawMarkers:
     return RawMarkers(list(columns), positions, rate, unit=said.get("unit", ""), up=up)
 
 
+def find_marker_columns(path: Path) -> set[str]:
+    """Names of the points that the first rows of a table seem to speak of, in lower case; none for no table.
+
+    Raises:
+        FormatError: The file cannot be read.
+    """
+    rows = [text for text in read_lines(path) if text.strip() and not text.lstrip().startswith("#")][:2]
+    cells = [[cell.strip().strip('"').strip() for cell in text.split(_separator(text))] for text in rows]
+    if len(cells) == 2 and _is_axes(cells[1]):
+        return {name.lower() for name in cells[0] if name}
+    matches = [_COLUMN.match(cell) for cell in cells[0]] if cells else []
+    return {match[1].lower().removesuffix("_q") for match in matches if match}
+
+
 def _separator(text: str) -> str:
     return max(",;\t", key=text.count)
 
