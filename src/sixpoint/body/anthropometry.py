@@ -36,6 +36,27 @@ def segments_of_stature(stature: float) -> dict[str, float]:
     return {name: fraction * stature for name, fraction in _proportions()["segments"].items()}
 
 
+def segments_of_skeleton(skeleton: Skeleton) -> dict[str, float]:
+    """The segment lengths [m] from which ``build_skeleton`` makes a skeleton: its inverse.
+
+    Raises:
+        FigureError: It was not made so.
+    """
+    names = list(segments_of_stature(MEAN_STATURE))
+    ones = dict.fromkeys(names, 1.0)
+    zero = build_skeleton(ones)
+    if skeleton.names != zero.names:
+        raise FigureError("only the built-in figure has segment lengths; this skeleton has other joints")
+    grown = [build_skeleton(ones | {name: 2.0}).offsets - zero.offsets for name in names]
+    lengths = np.linalg.lstsq(
+        np.reshape(grown, (len(names), -1)).T, skeleton.offsets.reshape(-1), rcond=None
+    )[0]
+    segments = dict(zip(names, map(float, lengths), strict=True))
+    if not np.allclose(build_skeleton(segments).offsets, skeleton.offsets, atol=1e-6):
+        raise FigureError("this skeleton has the built-in figure's joints, but in other places")
+    return segments
+
+
 def build_skeleton(segments: Mapping[str, float] | None = None) -> Skeleton:
     """The 34-joint figure with its soles on the floor (y = 0).
 

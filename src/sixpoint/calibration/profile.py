@@ -5,9 +5,8 @@ Trackers are known by their serials. Text goes in and out here; files belong to 
 
 from __future__ import annotations
 
-import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +20,7 @@ from sixpoint.body.anthropometry import segments_of_stature
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import POINTS
 from sixpoint.calibration.mounts import Calibration, Mount
+from sixpoint.calibration.toml import TableReader, toml_key, toml_number, toml_numbers, toml_text
 from sixpoint.errors import FormatError, TargetError, listed
 
 Array = NDArray[np.float64]
@@ -130,24 +130,26 @@ class Profile:
 
 def format_profile(profile: Profile) -> str:
     """A profile as TOML text; ``parse_profile`` gives it back to the last bit."""
-    lines = [f"version = {VERSION}", f"stature = {_number(profile.stature)}  # [m]"]
+    lines = [f"version = {VERSION}", f"stature = {toml_number(profile.stature)}  # [m]"]
     if profile.segments:
         lines += ["", "[segments]  # [m]"]
-        lines += [f"{name} = {_number(length)}" for name, length in profile.segments.items()]
+        lines += [f"{name} = {toml_number(length)}" for name, length in profile.segments.items()]
     if profile.sources:
         lines += ["", "[sources]"]
-        lines += [f"{_key(name)} = {_text(source)}" for name, source in profile.sources.items()]
+        lines += [f"{toml_key(name)} = {toml_text(source)}" for name, source in profile.sources.items()]
     for serial, worn in profile.trackers.items():
         mount = worn.mount
-        lines += ["", f"[trackers.{_text(serial)}]", f"effector = {_text(worn.point)}"]
+        lines += ["", f"[trackers.{toml_text(serial)}]", f"effector = {toml_text(worn.point)}"]
         if np.isfinite(mount.offset).all():
-            lines.append(f"offset = {_numbers(mount.offset)}  # from the joint, in the tracker's frame [m]")
+            lines.append(
+                f"offset = {toml_numbers(mount.offset)}  # from the joint, in the tracker's frame [m]"
+            )
         if np.isfinite(mount.rotation).all():
-            lines.append(f"rotation = {_numbers(mount.rotation)}  # segment<-tracker, xyzw")
+            lines.append(f"rotation = {toml_numbers(mount.rotation)}  # segment<-tracker, xyzw")
         if np.isfinite(mount.std):
-            lines.append(f"std = {_number(mount.std)}  # of the offset [m]")
+            lines.append(f"std = {toml_number(mount.std)}  # of the offset [m]")
         if np.isfinite(mount.rotation_std):
-            lines.append(f"rotation_std = {_number(mount.rotation_std)}  # [rad]")
+            lines.append(f"rotation_std = {toml_number(mount.rotation_std)}  # [rad]")
     return "\n".join(lines) + "\n"
 
 
@@ -165,7 +167,7 @@ def parse_profile(text: str, path: str | Path = "profile") -> Profile:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FormatError(path, f"not a TOML file: {error}") from error
-    read = _Reader(path)
+    read = TableReader(path)
     read.only(table, "", ("version", "stature", "segments", "sources", "trackers"))
     version = table.get("version")
     if version != VERSION or isinstance(version, bool):
@@ -190,42 +192,7 @@ def parse_profile(text: str, path: str | Path = "profile") -> Profile:
 # --- details -----------------------------------------------------------------------------------------
 
 
-class _Reader:
-    """Values of a table, with the key and what was expected in every complaint."""
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = path
-
-    def only(self, table: Mapping[str, Any], where: str, known: Sequence[str] | Mapping[str, Any]) -> None:
-        for key in table:
-            if key not in known:
-                raise FormatError(self.path, f"unknown key {where}{key}", expected=f"one of {listed(known)}")
-
-    def table(self, table: Mapping[str, Any], key: str) -> dict[str, Any]:
-        value = table.get(key, {})
-        if not isinstance(value, dict):
-            raise FormatError(self.path, key, expected="a table", got=repr(value))
-        return dict(value)
-
-    def number(
-        self, table: Mapping[str, Any], key: str, low: float, high: float, what: str, where: str = ""
-    ) -> float:
-        value = table.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise FormatError(self.path, f"{where}{key}", expected=what, got=repr(value))
-        return float(value)
-
-    def numbers(self, table: Mapping[str, Any], key: str, size: int, most: float, where: str) -> Array:
-        value = table.get(key)
-        what = f"{size} numbers from {-most:g} to {most:g}"
-        if not isinstance(value, list) or len(value) != size:
-            raise FormatError(self.path, f"{where}{key}", expected=what, got=repr(value))
-        return np.array(
-            [self.number({key: v}, key, -most, most, what, where) for v in value],
-        )
-
-
-def _worn(read: _Reader, serial: str, entry: Any) -> Worn:
+def _worn(read: TableReader, serial: str, entry: Any) -> Worn:
     where = f"trackers.{serial}."
     if not isinstance(entry, dict):
         raise FormatError(read.path, where[:-1], expected="a table", got=repr(entry))
@@ -249,20 +216,3 @@ def _worn(read: _Reader, serial: str, entry: Any) -> Worn:
     if "rotation_std" in entry:
         rotation_std = read.number(entry, "rotation_std", 0.0, 10.0, "a standard deviation in radians", where)
     return Worn(str(point), Mount(offset, turn, std, rotation_std))
-
-
-def _key(name: str) -> str:
-    return name if name.replace("_", "").isalnum() and name.isascii() else _text(name)
-
-
-def _text(value: str) -> str:
-    """A TOML basic string: JSON's escapes are TOML's, but for DEL."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _numbers(values: Array) -> str:
-    return "[" + ", ".join(_number(v) for v in values) + "]"

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.marker_roles import MarkerRoles
-from sixpoint.body.markers import Markers
 from sixpoint.calibration.markers.kinematics import Kinematics, exponential
 from sixpoint.calibration.markers.places import Places
 from sixpoint.errors import TargetError, listed
@@ -28,29 +26,13 @@ PAIRS = (
 CROSSED = 0.02  # a pair that lies this far the wrong way round, in the median, is swapped [m]
 
 
-def check_labels(markers: Markers, found: MarkerRoles) -> None:
-    """Some labels must be known, and their markers seen.
-
-    Raises:
-        TargetError: None is, or none of these is ever seen.
-    """
-    if not found.roles:
-        raise TargetError(
-            f"{markers.name}: no label is of a known marker set: {listed(markers.names)}; "
-            'name them in a layout, a TOML file with lines such as LASI = "l_asis"'
-        )
-    seen = markers.selected(list(found.roles)).tracked
-    if not seen.any():
-        raise TargetError(f"{markers.name}: none of the markers is ever seen: {listed(found.roles)}")
-
-
-def check_pelvis(places: Places, observed: Array, usable: NDArray[np.bool_], name: str) -> None:
-    """Some frame must determine the pelvis.
+def check_pelvis(places: Places, observed: Array, poses: Array, name: str) -> None:
+    """Some frame must determine the pelvis, so that there are poses (F, D).
 
     Raises:
         TargetError: None does; names the pelvis' markers and how often they are seen.
     """
-    if usable.any():
+    if len(poses):
         return
     pelvis = places.on("pelvis")
     share = np.isfinite(observed[..., 0]).mean(axis=0)

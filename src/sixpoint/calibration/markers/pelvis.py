@@ -9,8 +9,6 @@ from sixpoint.calibration.markers.places import Places, pelvic_tilt
 
 Array = NDArray[np.float64]
 
-HIP_STD = 0.08  # of the logarithm of the distance between the hips; Harrington et al.: 5 mm each
-
 
 def regress_pelvis(places: Places, observed: Array) -> tuple[Array, float | None]:
     """Expected offsets of all markers (M, 3), with those of the pelvis by regression; and the hips' distance.

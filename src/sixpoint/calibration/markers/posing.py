@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
+from sixpoint.body.anthropometry import segments_of_skeleton
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.marker_roles import Layout, find_marker_roles
 from sixpoint.body.markers import Markers
@@ -63,7 +64,7 @@ def pose_markers(
     kinematics = Kinematics()
     names = [name for name in model.names if name in markers.names]
     rows = [model.names.index(name) for name in names]
-    lengths = model_lengths(model, kinematics)
+    lengths = _lengths(model)
     places = place_markers(find_marker_roles(names, layout), 1.75, kinematics)
     offsets = model.offsets[rows] - places.reach @ lengths
     observed = markers.selected(names).positions
@@ -83,7 +84,8 @@ def pose_markers(
         state = solve_poses(problem, State(lengths, offsets, first[usable]))
         poses[np.arange(len(poses))[part][usable]] = state.poses
         away = np.linalg.norm(problem.residuals(state), axis=2)
-        residuals[np.ix_(np.arange(len(poses))[part][usable], rows)] = away
+        index = np.arange(len(poses))[part][usable]
+        residuals[index[:, None], np.array(rows)] = away
     found = np.isfinite(poses[:, 0])
     if not found.any():
         raise TargetError("in no frame are three markers of the pelvis seen together")
@@ -91,24 +93,14 @@ def pose_markers(
     return Posed(_motion(model, kinematics, poses[nearest], markers), residuals, found)
 
 
-def model_lengths(model: MarkerModel, kinematics: Kinematics) -> Array:
-    """(K,) segment lengths of a built-in figure [m]."""
-    flat = kinematics.per_length[1:].reshape(-1, len(SEGMENTS))
-    offsets = model.figure.skeleton.offsets[1:].reshape(-1)
-    lengths, *_ = np.linalg.lstsq(flat, offsets, rcond=None)
-    return np.asarray(lengths)
+def _lengths(model: MarkerModel) -> Array:
+    return np.array([segments_of_skeleton(model.figure.skeleton)[name] for name in SEGMENTS])
 
 
 def _motion(model: MarkerModel, kinematics: Kinematics, poses: Array, markers: Markers) -> Motion:
-    world = kinematics.place(model_lengths(model, kinematics), poses).world
+    world = kinematics.place(_lengths(model), poses).world
     parents = kinematics.skeleton.parents
     local = world.copy()
     local[:, 1:] = np.swapaxes(world[:, parents[1:]], 2, 3) @ world[:, 1:]
-    return model.figure.compute_motion(
-        matrices_to_quaternions(local), poses[:, :3], markers.rate, name=markers.name
-    )
-
-
-def matrices_to_quaternions(matrices: Array) -> Array:
-    """(..., 3, 3) -> (..., 4)."""
-    return rot.from_axes(matrices[..., 0], matrices[..., 1], matrices[..., 2])
+    turns = rot.from_axes(local[..., 0], local[..., 1], local[..., 2])
+    return model.figure.compute_motion(turns, poses[:, :3], markers.rate, name=markers.name)
