@@ -66,3 +66,69 @@ def walking_markers(frames: int = 120) -> Markers:
     """A walk with CMU's 41 markers, without gaps."""
     figure = sp.Figure.from_stature(1.75)
     return place_markers(make_sample("walk", figure).sliced(slice(0, frames)), figure)
+
+
+def misplaced_roles(markers: Markers, roles: dict[str, str]) -> list[str]:
+    """What is wrong with the places of markers in an upright recording, by anatomy; empty if nothing is.
+
+    Args:
+        markers: In metres, Y up.
+        roles: Role -> label.
+    """
+    at = {role: markers.positions[:, markers.index(label)] for role, label in roles.items()}
+
+    def share(condition: np.ndarray, known: np.ndarray) -> float:
+        return float(condition[known].mean()) if known.any() else 1.0
+
+    def both(a: str, b: str) -> bool:
+        return a in at and b in at
+
+    wrong = []
+    pairs = [role[2:] for role in at if role.startswith("l_") and f"r_{role[2:]}" in at]
+    forward = [at[f"{s}_toe"] - at[f"{s}_heel"] for s in "lr" if both(f"{s}_toe", f"{s}_heel")]
+    forward += [at[f"{s}_toe_tip"] - at[f"{s}_heel"] for s in "lr" if both(f"{s}_toe_tip", f"{s}_heel")]
+    front = np.nanmean(forward, axis=0) * [1, 0, 1]
+    front /= np.linalg.norm(front, axis=1, keepdims=True)
+    left = np.cross([0.0, 1.0, 0.0], front)
+    for name in pairs:  # walking legs cross the middle: mostly is enough
+        across = np.sum((at[f"l_{name}"] - at[f"r_{name}"]) * left, axis=1)
+        if share(across > 0, np.isfinite(across)) < 0.9:
+            wrong.append(f"left {name} is not on the left")
+    heights = ["heel", "ankle_lateral", "knee_lateral", "asis", "acromion", "head_front"]
+    for s in "lr":
+        rows = [f"{s}_{name}" for name in heights if f"{s}_{name}" in at]
+        for low, high in zip(rows, rows[1:], strict=False):
+            up = at[high][:, 1] - at[low][:, 1]
+            if share(up > 0, np.isfinite(up)) < 0.6:  # heels rise above ankles
+                wrong.append(f"{high} is not above {low}")
+        for back, ahead in (
+            ("psis", "asis"),
+            ("heel", "toe"),
+            ("heel", "fifth_metatarsal"),
+            ("head_back", "head_front"),
+        ):
+            if both(f"{s}_{back}", f"{s}_{ahead}"):
+                way = np.sum((at[f"{s}_{ahead}"] - at[f"{s}_{back}"]) * front, axis=1)
+                if share(way > 0, np.isfinite(way)) < 0.9:
+                    wrong.append(f"{s}_{ahead} is not in front of {s}_{back}")
+        for a, b, least, most in (
+            ("knee_lateral", "ankle_lateral", 0.3, 0.55), ("elbow_lateral", "wrist_radial", 0.15, 0.35),
+            ("elbow_lateral", "wrist_ulnar", 0.15, 0.35), ("acromion", "elbow_lateral", 0.2, 0.42),
+            ("knee_lateral", "knee_medial", 0.06, 0.18), ("ankle_lateral", "ankle_medial", 0.04, 0.14),
+            ("wrist_radial", "wrist_ulnar", 0.03, 0.12), ("heel", "toe", 0.12, 0.3),
+            ("hip_centre", "knee_centre", 0.3, 0.55),
+        ):  # fmt: skip
+            if both(f"{s}_{a}", f"{s}_{b}"):
+                way = np.nanmedian(np.linalg.norm(at[f"{s}_{a}"] - at[f"{s}_{b}"], axis=1))
+                if not least < way < most:
+                    wrong.append(f"{s}_{a} and {s}_{b} are {way:.2f} m apart")
+        for a, b, far in (
+            ("thigh", "knee_lateral", 0.5),
+            ("shank", "knee_lateral", 0.45),
+            ("forearm", "elbow_lateral", 0.3),
+        ):
+            if both(f"{s}_{a}", f"{s}_{b}"):
+                way = np.nanmedian(np.linalg.norm(at[f"{s}_{a}"] - at[f"{s}_{b}"], axis=1))
+                if way > far:
+                    wrong.append(f"{s}_{a} is {way:.2f} m from {s}_{b}")
+    return wrong

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import recordings
+from marker_bodies import misplaced_roles, walking_markers
 from sixpoint.body.marker_roles import _sets, find_marker_roles, segments_of_roles
 from sixpoint.errors import FormatError, TargetError
+from sixpoint.formats.markers import load_markers
+
+WALK = walking_markers(60)
 
 SIDED_GAIT = "ASI PSI THI KNE TIB ANK HEE TOE FHD BHD SHO UPA ELB FRM WRA WRB FIN"
 SIDED_CMU = "FWT BWT THI KNE SHN ANK HEE TOE MT5 FHD BHD SHO UPA ELB FRM WRA WRB FIN"
@@ -83,6 +90,12 @@ def test_a_label_means_what_its_set_says():
     assert both.set_name == "OpenCap augmented" and both.share == 5 / 7
 
 
+def test_pieces_of_trajectories_have_the_role_of_the_whole():
+    """CMU numbers pieces behind a hyphen; the first of them takes the role."""
+    found = find_marker_roles(["LFWT-3", "RFWT", "LFWT-7", "LBWT", "C7"])
+    assert found.roles["LFWT-3"] == "l_asis" and found.unknown == ("LFWT-7",)
+
+
 def test_of_two_people_the_one_with_more_markers_is_taken():
     """The other's labels are listed as unknown."""
     found = find_marker_roles(["anna:LASI", "nick:LASI", "nick:RASI", "nick:C7", "anna:C7"])
@@ -138,3 +151,22 @@ def test_any_labels_are_divided_into_known_and_unknown(labels):
     found = find_marker_roles(labels)
     assert sorted([*found.roles, *found.unknown]) == sorted(labels)
     assert len(set(found.roles.values())) == len(found.roles) == len(found.segments)
+
+
+def test_the_check_of_places_finds_exchanged_labels():
+    """Markers where they belong are not complained about; exchanged ones are."""
+    roles = find_marker_roles(WALK.names).labels
+    assert misplaced_roles(WALK, roles) == []
+    assert misplaced_roles(WALK, {**roles, "l_asis": roles["r_asis"], "r_asis": roles["l_asis"]})
+    assert misplaced_roles(WALK, {**roles, "l_knee_lateral": roles["l_ankle_lateral"]})
+
+
+@pytest.mark.parametrize("path", [*recordings("c3d/*.c3d"), *recordings("trc/*.trc")])
+def test_real_files_are_recognised_and_their_roles_are_where_they_belong(path):
+    """Most labels have roles, left is on the left, and bones have the length of bones."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        markers = load_markers(path)
+    found = find_marker_roles(markers.names)
+    assert len(found.roles) >= 15 and {"l_asis", "r_asis"} <= set(found.labels), found
+    assert misplaced_roles(markers, found.labels) == []

@@ -96,9 +96,12 @@ def _plain(label: str) -> str:
 
 
 def _spellings(label: str) -> list[str]:
-    """A label as the tables may have it: ``"RightKnee"`` and ``"knee_right"`` are also ``"rknee"``."""
+    """A label as the tables may have it: ``"RightKnee"`` and ``"knee_right"`` are also ``"rknee"``.
+
+    A number behind a hyphen marks a piece of a trajectory: ``"LFWT-12"`` is also ``"lfwt"``.
+    """
     plain = _plain(label)
-    found = [plain]
+    found = [plain, _plain(re.sub(r"-\d+\Z", "", label))]
     for word in ("left", "right"):
         if plain.startswith(word):
             found.append(word[0] + plain[len(word) :])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import FormatError, TargetError, listed
-from sixpoint.formats.source import LARGEST, parse_number, read_lines
+from sixpoint.formats.source import parse_cells, parse_number, read_lines
 
 Array = NDArray[np.float64]
 
@@ -81,7 +80,7 @@ def _read_table(path: Path) -> _Table:
             rows.append(cells)
     if header is None or not rows:
         raise FormatError(path, "the table holds no rows", expected=f"a header and rows: {HEADER}")
-    values = _parse_cells(path, rows, lines, header)
+    values = parse_cells(path, rows, lines, lambda column: f"a number for {header[column]}")
     return _Table(dict(zip(header, values.T, strict=True)), lines, rate)
 
 
@@ -120,21 +119,6 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _parse_cells(path: Path, rows: Sequence[list[str]], lines: Sequence[int], header: list[str]) -> Array:
-    cells = [[cell or "nan" for cell in row] for row in rows]
-    try:
-        values = np.array(cells, dtype=np.float64)
-    except (ValueError, OverflowError):
-        values = None
-    if values is not None and not np.any(np.abs(values) > LARGEST):
-        return values
-    for row, line in zip(cells, lines, strict=True):
-        for name, cell in zip(header, row, strict=True):
-            if cell.lower().lstrip("+-") != "nan":
-                parse_number(path, line, cell, f"a number for {name}")
-    raise FormatError(path, "the numbers cannot be read")
 
 
 def _read_rotations(path: Path, table: _Table) -> Array | None:

@@ -19,7 +19,7 @@ from sixpoint.body.markers import Markers
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats.markers.raw import RawMarkers
 from sixpoint.formats.markers.times import rate_of_times
-from sixpoint.formats.source import LARGEST, parse_number, read_lines
+from sixpoint.formats.source import parse_cells, parse_number, read_lines
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,6 @@ def _read_header(
 
 def _parse(path: Path, rows: Sequence[list[str]], lines: Sequence[int], header: Sequence[str]) -> Array:
     width = len(header)
-    cells = []
     for row, line in zip(rows, lines, strict=True):
         while len(row) > width and not row[-1]:
             row.pop()
@@ -161,18 +160,7 @@ def _parse(path: Path, rows: Sequence[list[str]], lines: Sequence[int], header: 
             raise FormatError(
                 path, "wrong number of cells", line=line, expected=f"{width}", got=f"{len(row)}"
             )
-        cells.append([cell or "nan" for cell in row])
-    try:
-        values = np.array(cells, dtype=np.float64)
-    except (ValueError, OverflowError):
-        values = None
-    if values is not None and not np.any(np.abs(values) > LARGEST):
-        return values
-    for row, line in zip(cells, lines, strict=True):
-        for name, cell in zip(header, row, strict=True):
-            if cell.lower().lstrip("+-") != "nan":
-                parse_number(path, line, cell, f"a number for {name}")
-    raise FormatError(path, "the numbers cannot be read", line=lines[0])
+    return parse_cells(path, rows, lines, lambda column: f"a number for {header[column]}")
 
 
 def format_marker_csv(markers: Markers, positions: Array, unit: str, up: str) -> str:

@@ -19,12 +19,13 @@ from sixpoint.body.markers import Markers
 from sixpoint.errors import FormatError
 from sixpoint.formats.markers.raw import RawMarkers
 from sixpoint.formats.markers.times import rate_of_times
-from sixpoint.formats.source import LARGEST, parse_number, read_lines
+from sixpoint.formats.source import parse_cells, read_lines
 
 Array = NDArray[np.float64]
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?\Z")
 _KEYS = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
+_LOOKED = 100  # rows in which decimal commas are looked for
 _RATE_OFF = 0.02  # share by which times may differ from the stated rate
 
 
@@ -140,26 +141,13 @@ def _read_rows(
 def _parse(
     path: Path, rows: list[list[str]], lines: list[int], names: list[str], separator: str | None
 ) -> Array:
-    if separator != "," and any(_DECIMAL_COMMA.match(cell) for cell in rows[0]):
+    if separator != "," and any(_DECIMAL_COMMA.match(c) for row in rows[:_LOOKED] for c in row):
         rows = [[cell.replace(",", ".") for cell in row] for row in rows]
-    cells = [[cell or "nan" for cell in row] for row in rows]
-    try:
-        values = np.array(cells, dtype=np.float64)
-    except (ValueError, OverflowError):
-        values = None
-    if values is not None and not np.any(np.abs(values) > LARGEST):
-        return values
-    for row, line in zip(cells, lines, strict=True):
-        for column, cell in enumerate(row):
-            if cell.lower().lstrip("+-") != "nan":
-                marker = "" if column < 2 else f" of {names[(column - 2) // 3]}"
-                parse_number(
-                    path,
-                    line,
-                    cell,
-                    ("a frame number", "a time")[column] if column < 2 else f"a coordinate{marker}",
-                )
-    raise FormatError(path, "the numbers cannot be read", line=lines[0])
+
+    def what(column: int) -> str:
+        return ("a frame number", "a time", f"a coordinate of {names[(column - 2) // 3]}")[min(column, 2)]
+
+    return parse_cells(path, rows, lines, what)
 
 
 def _number(word: str) -> float:
