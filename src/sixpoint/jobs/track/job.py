@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.joint_angles import compute_joint_angles
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.markers import Markers
 from sixpoint.body.motion import FileSpace
@@ -16,16 +17,15 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
 from sixpoint.formats import ANGLE_SUFFIXES, save, save_angles
 from sixpoint.jobs.progress import Progress, silent
-from sixpoint.jobs.reading import Reading, open_markers
+from sixpoint.jobs.reading import Reading
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.jobs.track.feet import TIGHT, hold_feet
-from sixpoint.jobs.track.models import columns_of, find_model
+from sixpoint.jobs.track.models import columns_of, find_model, read_markers
 from sixpoint.jobs.track.options import Following
 from sixpoint.jobs.track.six import reduce_to_six
 from sixpoint.jobs.writing import check_output, keep_sources
 from sixpoint.signals.low_pass import low_pass
 from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedMotion
-from sixpoint.study.joint_angles import compute_joint_angles
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def track(
     files = check_output(out, OUTPUTS, force)
     files += check_output(picture, (".png",), force) if picture else []
     keep_sources(files, [source, following.model, following.static, following.layout])
-    markers = open_markers(source, reading)
+    markers = read_markers(source, reading)
     started = time.perf_counter()
     model = find_model(markers, following, progress)
     calibration = 0.0 if following.model else time.perf_counter() - started
@@ -111,12 +111,13 @@ def track(
         seconds += more
     motion, reduced = tracked.motion, None
     if six is not None:
-        targets, borrowed = reduce_to_six(model, positions, tracked.motion, markers.rate, source.stem)
+        believed = np.where((tracked.flags == 0)[..., None], positions, np.nan)
+        targets, borrowed = reduce_to_six(model, believed, tracked.motion, markers.rate, source.stem)
         solved = solve(model.figure, targets, six, progress)
         motion, reduced = solved.solution.motion, (targets, solved, borrowed)
     motion = replace(motion, name=out.stem, space=replace(FileSpace(), unit=0.01))
     if out.suffix.lower() in ANGLE_SUFFIXES:
-        save_angles(compute_joint_angles(model.figure, motion), out, force)
+        save_angles(compute_joint_angles(motion, model.figure), out, force)
     else:
         save(motion, out, force=force)
     done = Tracking(markers, model, positions, tracked, seconds, calibration, stances, reduced, files)

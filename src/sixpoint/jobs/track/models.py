@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from sixpoint.errors import TargetError, listed
 from sixpoint.formats import load_markers
 from sixpoint.jobs.marker_models import load_marker_model
 from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.reading import ALL, Reading
 from sixpoint.jobs.track.options import Following
 
 Array = NDArray[np.float64]
@@ -22,6 +24,12 @@ log = logging.getLogger("sixpoint")
 
 FEWEST = 3
 """A recording with fewer markers of the model says nothing about a body."""
+
+
+def read_markers(path: Path, reading: Reading) -> Markers:
+    """Read markers and take the frames asked for."""
+    markers = load_markers(path, unit=reading.unit, up=reading.up, rate=reading.rate)
+    return markers if reading.frames == ALL else markers.sliced(reading.frames)
 
 
 def find_model(markers: Markers, following: Following, progress: Progress = silent) -> MarkerModel:

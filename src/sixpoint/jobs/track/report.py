@@ -92,7 +92,7 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
         ("speed", f"{1 / max(done.seconds, 1e-9):.0f} times real time ({1e3 * done.seconds / rate:.2f} ms per frame)"),
     ]
     if done.calibration:
-        rows.insert(0, ("calibration", f"{done.calibration:.1f} s on {'the static trial' if False else 'this recording'}"))
+        rows.insert(0, ("calibration", f"{done.calibration:.1f} s; --model reuses a saved one"))
     swapped = tracked.flags == 3
     if swapped.any():
         rows.append(("swapped", f"{_counted(swapped, done)} found under each other's labels"))
