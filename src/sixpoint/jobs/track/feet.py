@@ -9,11 +9,12 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.motion import Motion
 from sixpoint.signals.contacts import find_contacts
+from sixpoint.solvers.tracking.priorities import find_parts
 
 Array = NDArray[np.float64]
 
 FADE = 0.06  # time in which a foot goes over from moving to standing, and back [s]
-TIGHT = {"feet": 0.002}
+TIGHT = {"feet": 1e-4}
 """Tolerance that holds feet where their markers are held [m]."""
 
 
@@ -34,17 +35,26 @@ def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array
     """
     stances, held = find_stances(model, motion), markers.copy()
     positions, world = motion.transforms
+    neutral = model.place(*model.figure.neutral_pose.compute_transforms())
+    places = neutral - model.figure.neutral_pose.compute_transforms()[0][model.figure.roles.pelvis]
+    feet = np.array(find_parts(model.figure, model.joints, places)) == "feet"
     for k, ankle in enumerate(model.figure.roles.ankle):
         mine = np.flatnonzero(np.isin(model.joints, model.figure.skeleton.subtree(ankle)))
+        knee = model.figure.roles.knee[k]
+        malleoli = np.flatnonzero(feet & (model.joints == knee))
         for start, stop in _runs(stances[:, k]):
             part = slice(start, stop)
             turn, place = rot.mean(world[part, ankle]), positions[part, ankle].mean(axis=0)
             moved = rot.mul(turn, rot.inv(world[part, ankle]))
-            share = _share(stop - start, motion.rate)[:, None, None]
+            share = _share(stop - start, motion.rate)[:, None]
             for i in mine:
                 there = place + rot.mul_vec(moved, markers[part, i] - positions[part, ankle])
                 still = np.nanmean(there, axis=0) if np.isfinite(there).any() else there[0]
-                held[part, i] = (1 - share[:, 0]) * markers[part, i] + share[:, 0] * still
+                held[part, i] = (1 - share) * markers[part, i] + share * still
+            for i in malleoli:  # the shank turns about them
+                if np.isfinite(markers[part, i]).any():
+                    still = np.nanmean(markers[part, i], axis=0)
+                    held[part, i] = (1 - share) * markers[part, i] + share * still
     return held, stances
 
 
