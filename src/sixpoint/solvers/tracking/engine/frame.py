@@ -17,7 +17,7 @@ from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
 from sixpoint.solvers.tracking.engine.step import solve_step
 
-COAST = 0.12  # what no marker sees goes on for about so long [s]
+COAST = 0.05  # what no marker sees goes on for about so long [s]
 SMOOTH = 0.02  # rates of change are means over about so long [s]
 SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
 TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]

@@ -72,7 +72,10 @@ def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
         flags[i] = tp.USED if is_seen(goal, i) else tp.LOST
         if flags[i] == tp.USED:
             seen += 1
-            vec.store(ahead, i, vec.sub(vec.load(goal, i), expected(w, numbers, memory, joint, i)))
+            off = vec.sub(vec.load(goal, i), expected(w, numbers, memory, joint, i))
+            if memory[i, tp.EASE_RATE] > 0.0:  # it is known to be away, and by how much
+                off = vec.add(off, (memory[i, tp.EASE], memory[i, tp.EASE + 1], memory[i, tp.EASE + 2]))
+            vec.store(ahead, i, off)
     common = NONE
     if seen >= 3:
         common = (
@@ -80,13 +83,17 @@ def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
             median(ahead, first, count, flags, 1),
             median(ahead, first, count, flags, 2),
         )
-    slack = options.gate + 0.5 * ACCELERATION * options.dt * options.dt + DRIFT * alone
+    # What a prediction misses is common to a segment, but for a quarter.
+    miss = (0.125 if seen >= 3 else 0.5) * ACCELERATION * options.dt * options.dt
+    slack = options.gate + miss + DRIFT * alone
     refused = 0
     for i in range(first, first + count):
         if flags[i] == tp.LOST:
             continue
         vec.store(ahead, i, vec.sub(vec.load(ahead, i), common))
         reach = slack + numbers[i, tp.SPREAD] + WANDER * memory[i, tp.UNSEEN]
+        if memory[i, tp.EASE_RATE] > 0.0:
+            reach += vec.norm((memory[i, tp.EASE], memory[i, tp.EASE + 1], memory[i, tp.EASE + 2]))
         reach = reach if seen >= 3 else 1.5 * reach
         ahead[i, 3] = reach
         if memory[i, tp.KNOWN] > 0.0 and vec.norm(vec.load(ahead, i)) > reach:
