@@ -38,7 +38,7 @@ def test_exact_markers_give_back_the_motion(name):
     result = MarkerTracker(case.model, limits=False).solve_frames(case.markers, case.motion.rate)
     used = case.posed
     assert joint_errors(result, case.motion)[:, used].mean() < 5e-3
-    assert np.sqrt(np.mean(result.residual**2)) < 6e-3
+    assert np.sqrt(np.mean(result.residual**2)) < 8e-3
     assert not result.flags.any()
 
 

@@ -40,10 +40,21 @@ class Followed(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the next frame needs: a pose, its rates of change, and what is remembered of the markers."""
+    """What the next frame needs.
+
+    Attributes:
+        pose: (2 J + 1, 4) local rotations, base position, hinge angles, as in prioritized IK.
+        speed: (2 J + 1, 4) their rates of change [rad/s, m/s]. The fourth numbers: of joints, time in which
+            they may still move to where they were found [s]; of the base, damping of the next frame [m]; of
+            hinges, whether markers told the joint.
+        lag: (2 J + 1, 4) what is shown beside the pose [rad, m], and how fast it fades [1/s].
+        markers: (M, 8) per marker: distance from its place in the joint's frame [m], times since it was used
+            and since it is refused [s], whether the distance is known, how much of it counts (0 to 1).
+    """
 
     pose: Array
     speed: Array
+    lag: Array
     markers: Array
 
     def copy(self) -> State:
@@ -97,18 +108,16 @@ class TrackingEngine:
             rest,
             *state,
             np.zeros((len(low.lowered.index), 5)),
-            np.empty_like(state.pose),
-            np.empty_like(state.pose),
+            *(np.empty_like(state.pose) for _ in range(3)),
             np.zeros((self._markers, 4)),
             np.zeros((6, 3)),
             np.zeros((columns + 1, columns)),
             *(np.zeros(size) for size in sizes[1:4]),
             np.zeros(sizes[4], np.int64),
-            np.zeros(self._joints, np.int64),
             *out,
         )
         return out._replace(flags=out.flags[:, self._back], residual=out.residual[:, self._back])
 
     def fresh(self, pose: Array) -> State:
         """A state at rest in a pose, nothing known of the markers."""
-        return State(pose.copy(), np.zeros_like(pose), np.zeros((self._markers, tp.MEMORY)))
+        return State(pose.copy(), np.zeros_like(pose), np.zeros_like(pose), np.zeros((self._markers, tp.MEMORY)))

@@ -186,7 +186,8 @@ class MarkerTracker:
         if two_sided is None:
             two_sided = len(markers) > 1 and bool(np.any(out.flags != tp.USED))
         if two_sided:  # the way back begins where this one ended, and knows what it has learnt
-            state.speed[:] *= -1.0
+            state.speed[:, :3] *= -1.0
+            state.lag[:] = 0.0
             back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done))
             out = blend(self.body, self.model, out, Followed(*(array[::-1] for array in back)), markers, rate)
         moving, translations = self.body.place_base(out.rotations, out.positions)
@@ -232,6 +233,7 @@ class MarkerTracker:
         quiet = self._options._replace(dt=1e-6, most=10)
         out = self._engine.run(seen[None], self._rest, state, quiet)
         state.speed[:] = 0.0
+        state.lag[:] = 0.0
         out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
         return out, state
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
+from sixpoint.body.dofs import Hinges
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.tracking.engine import packing as tp
@@ -24,13 +25,17 @@ def blend(
 ) -> Followed:
     """Join both ways: each joint leans to the way that saw its markers last.
 
+    Hinges stay hinges within their ranges; a ball between two allowed rotations may be a little outside.
+
     Doubt grows with the time since a marker was used, and fades when it is back; that of a joint is the mean
     over the markers it carries.
     """
     carries = carried_by(body, model)
     doubt = doubt_of(ahead.flags, rate) @ carries, doubt_of(back.flags[::-1], rate)[::-1] @ carries
     share = (doubt[0] + EVEN) / (doubt[0] + doubt[1] + 2 * EVEN)
-    rotations = _mix(ahead.rotations, back.rotations, share)
+    # In the world: there both ways agree about what markers tell, however they bend the back to it.
+    worlds = [_world(body, way)[1] for way in (ahead, back)]
+    rotations = _local(body, _mix(*worlds, share))
     base = share[:, body.base, None]
     positions = (1 - base) * ahead.positions + base * back.positions
     moving, translations = body.place_base(rotations, positions)
@@ -63,6 +68,28 @@ def doubt_of(flags: NDArray[np.int64], rate: float) -> Array:
         known = np.where(lost, known + 1 / rate, known * fade)
         out[f] = known
     return out
+
+
+def _world(body: Articulation, way: Followed) -> tuple[Array, Array]:
+    """Places (F, J, 3) [m] and rotations (F, J, 4) of the rig in the world."""
+    moving, translations = body.place_base(way.rotations, way.positions)
+    return body.rig.compute_transforms(way.rotations, translations, moving)
+
+
+def _local(body: Articulation, world: Array) -> Array:
+    """Local rotations of world rotations (F, J, 4); hinges keep what they can express, within their ranges."""
+    local = rot.mul(rot.inv(world[:, np.maximum(body.tree.parents, 0)]), world)
+    local[:, 0] = world[:, 0]
+    for joint, dof in body.dofs.joints.items():
+        if not isinstance(dof, Hinges):
+            continue
+        before, after = body.before[joint], body.neutral[joint]
+        angles = dof.compute_angles(rot.mul(rot.mul(rot.inv(before), local[:, joint]), rot.inv(after)))
+        turned = np.tile(before, (len(local), 1))
+        for axis, angle in zip(dof.axes, np.clip(angles, dof.lower, dof.upper).T, strict=True):
+            turned = rot.mul(turned, rot.from_axis_angle(axis, angle))
+        local[:, joint] = rot.mul(turned, after)
+    return np.asarray(local)
 
 
 def _mix(a: Array, b: Array, share: Array) -> Array:

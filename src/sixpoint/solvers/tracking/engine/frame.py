@@ -11,15 +11,20 @@ from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals
 from sixpoint.solvers.prioritized.engine.limits import hold_limits
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, unpack_model, unpack_scratch
 from sixpoint.solvers.prioritized.engine.step import scale_step
+from sixpoint.solvers.prioritized.engine.wishes import OFF
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
+from sixpoint.solvers.tracking.engine.smoothing import let_go, take_up
 from sixpoint.solvers.tracking.engine.step import solve_step
 
 COAST = 0.05  # what no marker sees goes on for about so long [s]
 SMOOTH = 0.02  # rates of change are means over about so long [s]
 SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
+ALL, OTHERS, RETURNED = 0, 1, 2
+MORE = 25  # iterations in which only what is back after a gap moves
+CAUTIOUS = 0.1  # their damping at first: the way may be far [m]
 TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
 PENALTY = 100.0  # weight of what exceeds a tolerance
 WORSE, SLACK = 1.01, 1e-5  # a merit beyond this share and sum [m^2] is worse: the posture moves a little
@@ -43,26 +48,29 @@ def predict(m, state, speed, dt):
 
 
 @helper
-def update_speed(m, state, before, speed, table, flags, seen, dt):
-    """Rates of change from two states; of joints that carry no seen marker they fade."""
+def update_speed(m, state, before, speed, table, flags, dt):
+    """Rates of change from two states; of joints that carry no seen marker they fade, of those that return too."""
     joints = len(m.parent)
     for j in range(joints):
-        seen[j] = 0
+        speed[joints + 1 + j, 3] = 0.0
     for i in range(len(flags)):
         if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
             j = table[i, tp.JOINT]
-            while j >= 0 and seen[j] == 0:
-                seen[j] = 1
+            while j >= 0 and speed[joints + 1 + j, 3] == 0.0:
+                speed[joints + 1 + j, 3] = 1.0
                 j = m.parent[j]
-    share = dt / (SMOOTH + dt)
+    usual = dt / (SMOOTH + dt)
     fade = exp(-dt / COAST)
-    for k in range(3):
-        rate = (state[joints, k] - before[joints, k]) / dt
-        speed[joints, k] += share * (rate - speed[joints, k])
-        if seen[m.base] == 0:
-            speed[joints, k] *= fade
     for j in range(joints):
-        keep = 1.0 if seen[j] else fade
+        keep, share = 1.0, usual
+        if speed[joints + 1 + j, 3] == 0.0:
+            keep = fade
+        if speed[j, 3] > 0.0:  # it moves to where it is, not as it is
+            keep, share = fade, 0.0
+        if j == m.base:
+            for k in range(3):
+                rate = (state[joints, k] - before[joints, k]) / dt
+                speed[joints, k] = keep * (speed[joints, k] + share * (rate - speed[joints, k]))
         if m.kind[j] == BALL:
             turn = qt.log(qt.mul(qt.load(state, j), qt.inv(qt.load(before, j))))
             for k in range(3):
@@ -91,12 +99,14 @@ def copy_rows(source, target):
 
 
 @helper
-def merit(w, values, clusters, numbers, memory, flags, goal):
+def merit(w, values, clusters, numbers, memory, flags, goal, part, speed):
     """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
     total = 0.0
     for k in range(len(clusters)):
         joint, first, count = clusters[k, tp.JOINT], clusters[k, tp.FIRST], clusters[k, tp.COUNT]
         weight, centre = 0.0, (0.0, 0.0, 0.0)
+        if part == OTHERS and speed[joint, 3] > 0.0:
+            continue
         for i in range(first, first + count):
             if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
                 local = place_in_joint(numbers, memory, i)
@@ -115,9 +125,12 @@ def merit(w, values, clusters, numbers, memory, flags, goal):
 @helper
 def improve(
     m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, rest, tensor,
-    normal, damping, o,
+    normal, damping, part, speed, o,
 ):  # fmt: skip
     """Iterate one frame; returns the iterations and the damping that the next one begins with.
+
+    ``part`` says whether all clusters count, those of joints that are back after a gap not, or only such
+    joints move.
 
     Where a step makes things worse, limits that it ran into made it so: it is taken back, and the next one is
     more damped (Levenberg, Marquardt).
@@ -127,22 +140,26 @@ def improve(
     if o.limits:
         hold_limits(m, balls, state)
     compute_world(m, w, state)
-    here = merit(w, values, clusters, numbers, memory, flags, goal)
-    for n in range(o.most):
+    here = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
+    most = o.most if part != RETURNED else MORE
+    for n in range(most):
         for k in range(len(clusters)):
             build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
+            if part == OTHERS and speed[clusters[k, tp.JOINT], 3] > 0.0:
+                w.block[clusters[k, tp.MOVE], 2] = OFF
+                w.block[clusters[k, tp.TURN], 2] = OFF
         posture = -1
         if o.posture > 0.0 and (n == 0 or o.cold):
             posture = step + 1
             posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
-        solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal)
+        solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, part == RETURNED, speed)
         scale_step(m, w, settings, step, 1.0)
         copy_rows(state, old)
         retract(m, w, state, step)
         if o.limits:
             hold_limits(m, balls, state)
         compute_world(m, w, state)
-        there = merit(w, values, clusters, numbers, memory, flags, goal)
+        there = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
         if there > WORSE * here + SLACK:
             copy_rows(old, state)
             compute_world(m, w, state)
@@ -152,7 +169,7 @@ def improve(
         damping = max(0.5 * damping, o.damping)
         if largest_step(m, w, step) < (1e-3 if o.cold else SMALL):
             return n + 1, damping
-    return o.most, damping
+    return most, damping
 
 
 @entry
@@ -171,9 +188,11 @@ def track_markers(
     rest,
     state,
     speed,
+    lag,
     memory,
     forced,
     before,
+    expected,
     old,
     ahead,
     tensor,
@@ -182,7 +201,6 @@ def track_markers(
     rows,
     small,
     marks,
-    seen,
     rotations,
     translations,
     flags,
@@ -200,6 +218,7 @@ def track_markers(
     o = unpack_options(options)
     for f in range(len(markers)):
         goal = markers[f]
+        part, arrived = ALL, False
         copy_rows(state, before)
         if o.cold:
             for i in range(len(table)):
@@ -207,29 +226,40 @@ def track_markers(
         else:
             predict(m, state, speed, o.dt)
             compute_world(m, w, state)
-            screen(w, table, segments, numbers, memory, flags[f], goal, ahead, o)
+            screen(m, w, table, segments, numbers, memory, flags[f], goal, ahead, speed, o)
+            copy_rows(state, expected)
+            for j in range(joints):
+                part = OTHERS if speed[j, 3] > 0.0 else part
         iterations[f], speed[joints, 3] = improve(
             m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old, rest,
-            tensor, normal, max(speed[joints, 3], o.damping), o,
+            tensor, normal, max(speed[joints, 3], o.damping), part, speed, o,
         )  # fmt: skip
+        if part == OTHERS:
+            more, _ = improve(
+                m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old, rest,
+                tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
+            )  # fmt: skip
+            iterations[f] += more
+            arrived = more < MORE
+        copy_rows(state, old)
         if not o.cold:
-            learn_distances(w, table, segments, numbers, memory, flags[f], goal, o.dt)
-            update_speed(m, state, before, speed, table, flags[f], seen, o.dt)
-        locals_of_hinges(m, state)
+            learn_distances(w, segments, numbers, memory, flags[f], goal, speed, o.dt)
+            update_speed(m, state, before, speed, table, flags[f], o.dt)
+            take_up(m, state, expected, lag, speed, o.dt, arrived)
+            let_go(m, old, lag)
+            if o.limits:
+                hold_limits(m, balls, old)
+            compute_world(m, w, old)
+        locals_of_hinges(m, old)
         for i in range(len(table)):
             residual[f, i] = 0.0
             if flags[f, i] == tp.LOST:
                 continue
             joint = table[i, tp.JOINT]
-            place = vec.add(
-                vec.load(w.position, joint),
-                qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i)),
-            )
-            measured = vec.load(goal, i)
-            if not o.cold and flags[f, i] != tp.REJECTED and memory[i, tp.EASE_RATE] > 0.0:
-                measured = vec.sub(measured, vec.load(memory[:, tp.EASE : tp.EASE + 3], i))
-            residual[f, i] = vec.norm(vec.sub(measured, place))
+            turned = qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i))
+            place = vec.add(vec.load(w.position, joint), turned)
+            residual[f, i] = vec.norm(vec.sub(vec.load(goal, i), place))
         for j in range(joints):
-            local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(state, j)), qt.load(m.after, j))
+            local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(old, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)
-        vec.store(translations, f, vec.load(state, joints))
+        vec.store(translations, f, vec.load(old, joints))

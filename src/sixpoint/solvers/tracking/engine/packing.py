@@ -15,8 +15,8 @@ TURN, MOVE, LAST = 3, 4, 5
 # Columns of a marker's numbers: its place in the joint's frame [m], its weight, its usual distance [m].
 OFFSET, WEIGHT, SPREAD = 0, 3, 4
 # Columns of what is remembered of a marker.
-BIAS, EASE, EASE_RATE, UNSEEN, REFUSED, KNOWN, TRUST = 0, 3, 6, 7, 8, 9, 10
-MEMORY = 12
+BIAS, UNSEEN, REFUSED, KNOWN, TRUST = 0, 3, 4, 5, 6
+MEMORY = 8
 
 USED, LOST, REJECTED, SWAPPED = range(4)
 """What became of a marker in a frame."""
@@ -51,20 +51,3 @@ def unpack_options(numbers):
         numbers[5],
         numbers[6],
     )
-
-
-class Memory(NamedTuple):
-    """What goes from frame to frame.
-
-    Attributes:
-        state: (2 J + 1, 4) local rotations, base position, hinge angles, as in prioritized IK.
-        speed: (2 J + 1, 4) their rates of change [rad/s, m/s]; the last number of the base's row is the damping
-            [m] that the next frame begins with.
-        marker: (M, 12) per marker: distance from its place [m] in the joint's frame, what is left of a jump
-            when it came back [m] and how fast that fades [1/s], times since it was used and since it is
-            refused [s], whether its distance is known, and how much of its distance counts (0 to 1).
-    """
-
-    state: object
-    speed: object
-    marker: object

@@ -17,8 +17,8 @@ DRIFT = 3.0  # speed at which a segment without markers leaves its prediction [m
 WANDER = 0.05  # the same of a lost marker on a segment that is seen [m/s]
 PATIENCE = 0.25  # a refused marker that has no better neighbours is believed after this time [s]
 MOST = 0.4  # share of refused markers from which on all are believed
-RETURN = 2.5  # speed at which a marker that came back is followed at first [m/s]
-QUICKEST, SLOWEST = 0.06, 0.3  # times in which what is left of the jump falls to a third [s]
+RETURNING = 0.2  # a segment that is back may move to where it is for so long [s]
+AWAY = 2.0  # how far it may be meanwhile [m]
 FORGOTTEN = 2.0  # a marker that is lost so long [s] no longer counts as missing from its segment
 ADAPT, FADE = 0.1, 0.15  # times in which usual distances are learnt, and cease to count [s]
 
@@ -63,7 +63,7 @@ def median(ahead, first, count, flags, axis):
 
 
 @helper
-def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options):
+def screen_segment(w, segments, numbers, memory, flags, goal, ahead, speed, s, options):
     """Refuse the markers of a segment that leave the others; ``ahead`` becomes what each is off by."""
     joint, first, count = segments[s, tp.JOINT], segments[s, tp.FIRST], segments[s, tp.COUNT]
     seen, alone = 0, 1e9
@@ -73,8 +73,6 @@ def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
         if flags[i] == tp.USED:
             seen += 1
             off = vec.sub(vec.load(goal, i), expected(w, numbers, memory, joint, i))
-            if memory[i, tp.EASE_RATE] > 0.0:  # it is known to be away, and by how much
-                off = vec.add(off, (memory[i, tp.EASE], memory[i, tp.EASE + 1], memory[i, tp.EASE + 2]))
             vec.store(ahead, i, off)
     common = NONE
     if seen >= 3:
@@ -85,15 +83,13 @@ def screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
         )
     # What a prediction misses is common to a segment, but for a quarter.
     miss = (0.125 if seen >= 3 else 0.5) * ACCELERATION * options.dt * options.dt
-    slack = options.gate + miss + DRIFT * alone
+    slack = options.gate + miss + DRIFT * alone + (AWAY if speed[joint, 3] > 0.0 else 0.0)
     refused = 0
     for i in range(first, first + count):
         if flags[i] == tp.LOST:
             continue
         vec.store(ahead, i, vec.sub(vec.load(ahead, i), common))
         reach = slack + numbers[i, tp.SPREAD] + WANDER * memory[i, tp.UNSEEN]
-        if memory[i, tp.EASE_RATE] > 0.0:
-            reach += vec.norm((memory[i, tp.EASE], memory[i, tp.EASE + 1], memory[i, tp.EASE + 2]))
         reach = reach if seen >= 3 else 1.5 * reach
         ahead[i, 3] = reach
         if memory[i, tp.KNOWN] > 0.0 and vec.norm(vec.load(ahead, i)) > reach:
@@ -147,29 +143,28 @@ def readmit(segments, memory, flags, s, dt):
 
 
 @helper
-def ease_in(w, table, numbers, memory, flags, goal, dt):
-    """Follow what comes back without a jump: what it is off by at first fades."""
-    for i in range(len(flags)):
-        if flags[i] == tp.LOST or flags[i] == tp.REJECTED:
-            memory[i, tp.UNSEEN] += dt
+def note_returns(m, table, segments, memory, flags, speed, dt):
+    """Mark joints that markers are back on, after nothing told how they are: they may have moved far."""
+    joints = len(m.parent)
+    for s in range(len(segments)):
+        first, count = segments[s, tp.FIRST], segments[s, tp.COUNT]
+        alone, back = 1e9, False
+        for i in range(first, first + count):
+            alone = min(alone, memory[i, tp.UNSEEN])
+            if flags[i] == tp.LOST or flags[i] == tp.REJECTED:
+                memory[i, tp.UNSEEN] += dt
+            else:
+                back = True
+                memory[i, tp.UNSEEN] = 0.0
+        if not back or alone < 1.5 * dt:
             continue
-        if memory[i, tp.UNSEEN] > 1.5 * dt and memory[i, tp.KNOWN] > 0.0:
-            place = expected(w, numbers, memory, table[i, tp.JOINT], i)
-            gap = vec.sub(place, vec.load(goal, i))
-            time = min(max(vec.norm(gap) / RETURN, QUICKEST), SLOWEST)
-            memory[i, tp.EASE], memory[i, tp.EASE + 1], memory[i, tp.EASE + 2] = gap
-            memory[i, tp.EASE_RATE] = 1.0 / time
-        memory[i, tp.UNSEEN] = 0.0
-        rate = memory[i, tp.EASE_RATE]
-        if rate > 0.0:
-            fade = exp(-rate * dt)
-            square = 0.0
-            for k in range(3):
-                memory[i, tp.EASE + k] *= fade
-                goal[i, k] += memory[i, tp.EASE + k]
-                square += memory[i, tp.EASE + k] ** 2
-            if square < 1e-8:
-                memory[i, tp.EASE_RATE] = 0.0
+        j = segments[s, tp.JOINT]
+        if speed[joints + 1 + j, 3] > 0.0:
+            continue  # markers below told how it is
+        speed[j, 3] = RETURNING
+        while j != m.base and speed[joints + 1 + m.parent[j], 3] == 0.0:
+            j = m.parent[j]
+            speed[j, 3] = RETURNING
 
 
 @helper
@@ -188,11 +183,11 @@ def trust_distances(segments, memory, flags, s, dt):
 
 
 @helper
-def screen(w, table, segments, numbers, memory, flags, goal, ahead, options):
-    """Judge all markers of a frame against the predicted pose; goals are eased and exchanged in place."""
+def screen(m, w, table, segments, numbers, memory, flags, goal, ahead, speed, options):
+    """Judge all markers of a frame against the predicted pose; goals are exchanged in place."""
     seen, refused = 0, 0
     for s in range(len(segments)):
-        found = screen_segment(w, segments, numbers, memory, flags, goal, ahead, s, options)
+        found = screen_segment(w, segments, numbers, memory, flags, goal, ahead, speed, s, options)
         seen, refused = seen + found[0], refused + found[1]
     if refused > MOST * seen:  # the prediction is wrong, not they
         for i in range(len(flags)):
@@ -202,13 +197,13 @@ def screen(w, table, segments, numbers, memory, flags, goal, ahead, options):
         exchange(w, table, numbers, memory, flags, goal, ahead)
     for s in range(len(segments)):
         readmit(segments, memory, flags, s, options.dt)
-    ease_in(w, table, numbers, memory, flags, goal, options.dt)
+    note_returns(m, table, segments, memory, flags, speed, options.dt)
     for s in range(len(segments)):
         trust_distances(segments, memory, flags, s, options.dt)
 
 
 @helper
-def learn_distances(w, table, segments, numbers, memory, flags, goal, dt):
+def learn_distances(w, segments, numbers, memory, flags, goal, speed, dt):
     """Update the usual distances of markers on segments that are seen whole."""
     share = dt / (ADAPT + dt)
     for s in range(len(segments)):
@@ -217,7 +212,7 @@ def learn_distances(w, table, segments, numbers, memory, flags, goal, dt):
             if flags[i] == tp.LOST or flags[i] == tp.REJECTED:
                 continue
             new = memory[i, tp.KNOWN] == 0.0
-            if not new and (memory[i, tp.TRUST] > 0.05 or memory[i, tp.EASE_RATE] > 0.0):
+            if not new and (memory[i, tp.TRUST] > 0.05 or speed[joint, 3] > 0.0):
                 continue
             gap = vec.sub(vec.load(goal, i), vec.load(w.position, joint))
             local = qt.inv_mul_vec(qt.load(w.rotation, joint), gap)

@@ -169,15 +169,31 @@ def force_clusters(w, index, values, clusters, forced, step):
 
 
 @helper
-def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal):
-    """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again."""
+def hold_others(m, w, speed):
+    """Lock all but the joints that are back after a gap: these come to the rest of the body, not it to them."""
+    if m.free and speed[m.base, 3] == 0.0:
+        for c in range(3):
+            w.locked[c] = 1
+    for j in range(len(m.parent)):
+        if speed[j, 3] == 0.0:
+            for c in range(m.start[j], m.start[j] + m.size[j]):
+                w.locked[c] = 1
+
+
+@helper
+def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, held, speed):
+    """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again.
+
+    With ``held`` only joints that are back after a gap move.
+    """
     fixed = len(w.row)
     step, basis = fixed + 1, fixed + 3 + w.small.shape[1]
     linear.clear(w.rows, fixed)
     release(m, w)
     for b in range(len(index)):
         forced[b, 4] = 0.0
-    held = False
+    if held:
+        hold_others(m, w, speed)
     for _ in range(ROUNDS):
         linear.copy(w.rows, step, fixed)
         size = solve_equalities(m, w, index, forced, fixed, basis) if held else 0
