@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 FRAMES, STATIC_FRAMES = 100, 10
 SIGMAS = (0.02, 0.01)  # of a marker around its place, in turn [m]; then what is found, within SIGMA_RANGE
 SIGMA_RANGE = (0.004, 0.012)
+ROUGH = 1e-3  # gain of a step, as a share of the cost, at which a first round ends
 UNFIT = 2.5  # frames whose residual is this many times the median's are left out
 
 DOING = "calibrating markers"
@@ -98,7 +99,7 @@ def calibrate_markers(
     for step, sigma in enumerate(SIGMAS):
         progress(DOING, 2 + step, steps)
         problem.sigma = sigma
-        state = solve_all(problem, state)
+        state = solve_all(problem, state, tolerance=ROUGH)
         problem, state = _without_unfit(problem, state)
     progress(DOING, steps - 1, steps)
     spread = _spread(problem, state)

@@ -33,8 +33,8 @@ def choose_frames(
     some, poses = some[usable], poses[usable]
     placed = kinematics.place(start.lengths, poses)
     seen = placed.positions - placed.positions[:, :1]
-    features = np.einsum("fyx,fjy->fjx", placed.world[:, 0], seen).reshape(len(poses), -1)
-    chosen = spread_rows(features, count)
+    features = np.einsum("fyx,fjy->fjx", placed.world[:, 0], seen)
+    chosen = spread_rows(features.reshape(len(poses), 3 * len(kinematics.skeleton)), count)
     return some[chosen], poses[chosen]
 
 

@@ -124,11 +124,11 @@ def _lay_limb(
         y = -upper
         x = rot.unit(side - np.sum(side * y, axis=1, keepdims=True) * y)
         new = np.stack([x, y, np.cross(x, y)], axis=-1)
-        turned = np.where(np.isfinite(new).all(axis=(1, 2), keepdims=True), new, above)
-    good = np.isfinite(upper).all(axis=1)
+        good = np.isfinite(middle).all(axis=1)
+        turned = np.where(good[:, None, None], new, above)
     poses[good, kin.dofs(limb[0])] = logarithm(np.swapaxes(above, 1, 2) @ turned)[good]
     flexion = np.arctan2(np.sum(bend * turned[..., 0], axis=1), np.sum(upper * lower, axis=1))
-    flexed = np.isfinite(flexion)
+    flexed = good & np.isfinite(end).all(axis=1)
     hinge = kin.dofs(limb[1])
     poses[flexed, hinge.start] = fold * np.maximum(flexion, 0.0)[flexed]
     if fold < 0:

@@ -6,6 +6,7 @@ and other results of models that share the list of points are left out.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from sixpoint.formats.source import read_bytes
 Array = NDArray[np.float64]
 
 _NO_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
-_AXES = {f"{sign}{axis}": f"{'-' if sign == '-' else ''}{axis.lower()}" for sign in "+-" for axis in "XYZ"}
+_AXIS = re.compile(r"([+-]?)([xyz])([+-]?)\Z")  # "+Z" in most files, "Z" or "Z+" in some
 
 
 def read_c3d(path: Path) -> RawMarkers:
@@ -71,10 +72,16 @@ def read_c3d(path: Path) -> RawMarkers:
         residuals[:, keep],
         _read_events(header, parameters, first, rate),
         (texts(parameters, "POINT", "UNITS") or [""])[0].strip(),
-        _AXES.get((texts(parameters, "POINT", "Y_SCREEN") or [""])[0].strip().upper(), ""),
+        _read_axis(parameters),
         "z",
         notes,
     )
+
+
+def _read_axis(parameters: Parameters) -> str:
+    """The axis that points up on the screen; empty where the file does not say."""
+    match = _AXIS.match((texts(parameters, "POINT", "Y_SCREEN") or [""])[0].strip().lower())
+    return ("-" if "-" in match[1] + match[3] else "") + match[2] if match else ""
 
 
 def _find_rate(header: Header, parameters: Parameters) -> float | None:
