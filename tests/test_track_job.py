@@ -1,4 +1,4 @@
-"""``sixpoint track`` from files to files, with a marker model that was saved, so that nothing is calibrated."""
+"""``sixpoint track`` from files to files, with a marker model that was saved."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from track_bodies import body
 
 import sixpoint as sp
 from sixpoint.body.markers import Markers
@@ -24,6 +23,7 @@ from sixpoint.jobs.track.replay import replay
 from sixpoint.live.frames import play_frames
 from sixpoint.live.statistics import Statistics
 from sixpoint.study.tracking import LOST, REFUSED, USED, overall, summarise_markers
+from track_bodies import body
 
 FRAMES = 90
 
@@ -78,7 +78,7 @@ def test_joint_angles_are_written(files, tmp_path):
 
 
 def test_six_points_of_markers(files, tmp_path):
-    """The six points are the joints', within millimetres where a segment has three markers; any method poses."""
+    """The six points are the joints', within millimetres; any method poses by them."""
     done = track(files[0], tmp_path / "six.bvh", following=following(files), six=Solving("sik"))
     assert done.six is not None
     targets, _, borrowed = done.six
@@ -130,7 +130,10 @@ def test_a_replay_keeps_the_pace(files):
     """Replayed live, every frame that is not left out is solved, and poses are those of a stream."""
     with replay(files[0], following=following(files)) as session:
         last = session.run()
-        assert last is not None and session.statistics.poses + session.statistics.counts["frames left out"] == FRAMES
+        assert (
+            last is not None
+            and session.statistics.poses + session.statistics.counts["frames left out"] == FRAMES
+        )
         assert session.statistics.poses > FRAMES // 2
 
 

@@ -1,4 +1,4 @@
-"""Following markers: an independent forward model makes them, least squares by SciPy says how near one can get."""
+"""Following markers: SciPy places them, and says how near one can get to them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from track_bodies import body, drop, markers_of
 
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.errors import FigureError, SixpointError, TargetError
 from sixpoint.solvers.tracking.priorities import find_parts
 from sixpoint.solvers.tracking.solver import LOST, REJECTED, SWAPPED, MarkerTracker
+from track_bodies import body, drop, markers_of
 
 FREE = {"feet": 1e3, "pelvis": 1e3, "hands": 1e3, "head": 1e3}
 

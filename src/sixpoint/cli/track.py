@@ -17,7 +17,9 @@ WORST = 12  # markers listed on the screen
 
 
 def track(
-    file: Annotated[Path, Parameter(help="Labelled markers: .c3d, .trc, .csv, .npz, or .json of a pose estimator.")],
+    file: Annotated[
+        Path, Parameter(help="Labelled markers: .c3d, .trc, .csv, .npz, or .json of a pose estimator.")
+    ],
     /,
     *,
     out: Annotated[
@@ -35,7 +37,8 @@ def track(
         Path | None, Parameter(help="The same person and markers standing still, to calibrate on.")
     ] = None,
     layout: Annotated[
-        Path | None, Parameter(help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`.')
+        Path | None,
+        Parameter(help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`.'),
     ] = None,
     markers: Annotated[
         str | None, Parameter(help="Follow these labels only: LASI,RASI,LKNE; by default all with a role.")
@@ -54,7 +57,8 @@ def track(
         Path | None, Parameter(help="Also draw body and markers at some frames, to this .png.")
     ] = None,
     report: Annotated[
-        Path | None, Parameter(help="Also write a report into this folder: residuals by marker, with pictures.")
+        Path | None,
+        Parameter(help="Also write a report into this folder: residuals by marker, with pictures."),
     ] = None,
     live: Annotated[
         bool, Parameter(negative="", help="Replay it at its own rate, solved frame by frame; writes nothing.")
@@ -129,7 +133,10 @@ def _replay(screen: Screen, file: Path, reading: object, following: object, view
     screen.rows(
         [
             ("live", session.statistics.line()),
-            ("solving", f"median {solving[0]:.2f} ms, p99 {solving[1]:.2f} ms; a frame is {1e3 / session.rate:.2f} ms"),
+            (
+                "solving",
+                f"median {solving[0]:.2f}, p99 {solving[1]:.2f} ms; a frame is {1e3 / session.rate:.2f} ms",
+            ),
             ("left out", f"{late} frames" if late else "no frame"),
         ]
     )

@@ -73,7 +73,9 @@ def overall(residual: Array, flags: Flags) -> float:
     return float(np.sqrt(np.mean(residual[used] ** 2))) if used.any() else float("nan")
 
 
-def draw_residuals(rows: Sequence[MarkerRow], residual: Array, flags: Flags, rate: float, title: str) -> Canvas:
+def draw_residuals(
+    rows: Sequence[MarkerRow], residual: Array, flags: Flags, rate: float, title: str
+) -> Canvas:
     """Residual by marker, worst first, and over time."""
     tall = max(2.6, 0.155 * len(rows) + 0.5)
     canvas = Canvas(figsize=(WIDTH, round((tall + 3.2) * DPI) / DPI), dpi=DPI)
@@ -90,7 +92,9 @@ def draw_residuals(rows: Sequence[MarkerRow], residual: Array, flags: Flags, rat
         notes += [f"{row.swapped} swapped"] if row.swapped else []
         bars.text(value, y, "  " + ", ".join(notes), va="center", size=7.5, color=SOFT)
     bars.set_yticks(place, [_plain(row.name) for row in rows])
-    style_axes(bars, np.array([0.0, 1.18 * max(float(np.nanmax(np.append(values, 0.1))), 0.1)]), "", "RMS [cm]")
+    style_axes(
+        bars, np.array([0.0, 1.18 * max(float(np.nanmax(np.append(values, 0.1))), 0.1)]), "", "RMS [cm]"
+    )
     bars.grid(axis="y", visible=False)
     bars.tick_params(labelsize=7.5)
     bars.set_ylim(-0.7, len(rows) - 0.3)
@@ -117,7 +121,12 @@ def draw_residuals(rows: Sequence[MarkerRow], residual: Array, flags: Flags, rat
 
 
 def draw_tracking(
-    figure: Figure, motion: Motion, markers: Array, flags: Flags, title: str, frames: Sequence[int] | None = None
+    figure: Figure,
+    motion: Motion,
+    markers: Array,
+    flags: Flags,
+    title: str,
+    frames: Sequence[int] | None = None,
 ) -> Canvas:
     """The body and the markers (F, M, 3) [m] at some frames; those refused are not drawn."""
     shown = list(frames) if frames is not None else _spread(len(motion))
@@ -129,7 +138,11 @@ def draw_tracking(
 
 
 def _spread(frames: int) -> list[int]:
-    return [round((k + 0.5) * (frames - 1) / SHOWN) for k in range(SHOWN)] if frames > SHOWN else list(range(frames))
+    return (
+        [round((k + 0.5) * (frames - 1) / SHOWN) for k in range(SHOWN)]
+        if frames > SHOWN
+        else list(range(frames))
+    )
 
 
 def _plain(text: str, longest: int = 24) -> str:

@@ -86,7 +86,7 @@ def track(
         progress: Told how far the work is.
 
     Raises:
-        SixpointError: The message says why. Nothing was written, but for a report or picture that could not be.
+        SixpointError: The message says why. Nothing was written, but for a report or picture that failed.
     """
     reading, following = reading or Reading(), following or Following()
     following.check()

@@ -71,7 +71,7 @@ def columns_of(model: MarkerModel, markers: Markers) -> Array:
     there = [name for name in model.names if name in markers.names]
     if len(there) < FEWEST:
         raise TargetError(
-            f"{markers.name}: only {len(there)} of the model's {len(model.names)} markers are in the recording "
+            f"{markers.name}: only {len(there)} of the model's {len(model.names)} markers are there "
             f"({listed(markers.names)}); following needs {FEWEST}, three on the pelvis to begin with"
         )
     absent = [name for name in model.names if name not in markers.names]

@@ -52,11 +52,13 @@ def build_document(done: Tracking) -> Document:
         (
             Heading("Summary"),
             Bullets(tuple(Paragraph(text, lead) for lead, text in describe_tracking(done))),
-            Picture("poses.png", encode(_poses(done)), "The body that follows, and the markers, at some frames."),
+            Picture(
+                "poses.png", encode(_poses(done)), "The body that follows, and the markers, at some frames."
+            ),
             Heading("Residuals"),
             Paragraph(
-                "A residual is the distance of a measured marker from its place on the figure. It holds skin that "
-                "moves, what a figure of rods cannot do, and errors of the calibration; in refused frames a marker "
+                "A residual is the distance of a measured marker from its place on the figure: moving skin, "
+                "what a figure of rods cannot do, and errors of the calibration. In refused frames a marker "
                 "was there, but not where it could be."
             ),
             Picture("residuals.png", encode(curves), "By marker, the worst first, and over time."),
@@ -86,10 +88,12 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     """Heads and texts: residual, gaps, what was refused, speed, what has no markers."""
     tracked, rate = done.tracked, done.markers.rate
     seen = tracked.flags != 1
+    rms, count = 100 * overall(tracked.residual, tracked.flags), len(done.model.names)
+    times, spent = 1 / max(done.seconds, 1e-9), 1e3 * done.seconds / rate
     rows = [
-        ("residual", f"RMS {100 * overall(tracked.residual, tracked.flags):.2f} cm over {len(done.model.names)} markers"),
+        ("residual", f"RMS {rms:.2f} cm over {count} markers"),
         ("samples", f"{seen.mean():.1%} seen; {_counted(tracked.flags == 2, done)} refused as ghosts"),
-        ("speed", f"{1 / max(done.seconds, 1e-9):.0f} times real time ({1e3 * done.seconds / rate:.2f} ms per frame)"),
+        ("speed", f"{times:.0f} times real time ({spent:.2f} ms per frame)"),
     ]
     if done.calibration:
         rows.insert(0, ("calibration", f"{done.calibration:.1f} s; --model reuses a saved one"))
@@ -99,7 +103,8 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     if done.model.missing:
         rows.append(("without markers", f"{listed(done.model.missing)}: kept near the neutral posture"))
     if done.stances is not None:
-        rows.append(("feet", f"held in {done.stances[:, 0].mean():.0%} (left) and {done.stances[:, 1].mean():.0%} (right) of the frames"))
+        left, right = done.stances.mean(axis=0)
+        rows.append(("feet", f"held in {left:.0%} (left) and {right:.0%} (right) of the frames"))
     return rows
 
 

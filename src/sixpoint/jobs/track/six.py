@@ -59,7 +59,9 @@ def reduce_to_six(
         near = np.flatnonzero(np.isin(model.joints, carriers))
         if open_.any() and len(near):
             off = markers[:, near] - places[:, near]
-            seen = np.isfinite(off[..., 0]) & (np.linalg.norm(places[:, near] - place[:, None], axis=-1) < REACH)
+            seen = np.isfinite(off[..., 0]) & (
+                np.linalg.norm(places[:, near] - place[:, None], axis=-1) < REACH
+            )
             count = np.maximum(seen.sum(axis=1), 1)[:, None]
             moved = place + np.where(seen[..., None], off, 0.0).sum(axis=1) / count
             points[:, k] = np.where((open_ & seen.any(axis=1))[:, None], moved, points[:, k])

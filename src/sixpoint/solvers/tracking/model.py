@@ -107,7 +107,13 @@ def _group(keys: Index) -> Index:
 
 
 def _lower_clusters(
-    body: Articulation, figure: Figure, carriers: Index, level: Index, numbers: Array, flext: bool, limits: bool
+    body: Articulation,
+    figure: Figure,
+    carriers: Index,
+    level: Index,
+    numbers: Array,
+    flext: bool,
+    limits: bool,
 ) -> tuple[Lowered, Index]:
     """Blocks of all clusters: FLEXT or three rows for the centre, three rows for turns."""
     groups = _group(carriers * (level.max() + 1) + level)

@@ -67,9 +67,9 @@ def find_parts(figure: Figure, joints: NDArray[np.int64], places: Array) -> tupl
         they tell where the end is.
     """
     roles, skeleton, rest = figure.roles, figure.skeleton, figure.rest_positions
-    below = {part: set() for part in ("feet", "hands", "head")}  # type: dict[str, set[int]]
-    for end, part in ((roles.ankle, "feet"), (roles.wrist, "hands"), ((roles.head,), "head")):
-        for joint in end:
+    below: dict[str, set[int]] = {part: set() for part in ("feet", "hands", "head")}
+    for tops, part in ((roles.ankle, "feet"), (roles.wrist, "hands"), ((roles.head,), "head")):
+        for joint in tops:
             below[part] |= {int(j) for j in skeleton.subtree(joint)}
     ends = [(m, e, "hands" if k < 2 else "feet") for k, (_, m, e) in enumerate(roles.limbs)]
     parts = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,16 @@ class Followed(NamedTuple):
     flags: Index
     residual: Array
     iterations: Index
+
+
+def join(parts: list[Followed]) -> Followed:
+    """Runs one after the other."""
+    return Followed(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def reverse(run: Followed) -> Followed:
+    """The frames from the last to the first."""
+    return Followed(*(array[::-1] for array in run))  # type: ignore[arg-type]
 
 
 class State(NamedTuple):
@@ -95,7 +105,7 @@ class TrackingEngine:
         )
         columns = len(low.lowered.model.hinges)
         sizes = scratch_sizes(low.lowered)
-        track_markers(
+        arguments: list[Any] = [
             *self._body,
             low.lowered.index.copy(),
             low.lowered.values.copy(),
@@ -115,9 +125,12 @@ class TrackingEngine:
             *(np.zeros(size) for size in sizes[1:4]),
             np.zeros(sizes[4], np.int64),
             *out,
-        )
+        ]
+        track_markers(*arguments)
         return out._replace(flags=out.flags[:, self._back], residual=out.residual[:, self._back])
 
     def fresh(self, pose: Array) -> State:
         """A state at rest in a pose, nothing known of the markers."""
-        return State(pose.copy(), np.zeros_like(pose), np.zeros_like(pose), np.zeros((self._markers, tp.MEMORY)))
+        return State(
+            pose.copy(), np.zeros_like(pose), np.zeros_like(pose), np.zeros((self._markers, tp.MEMORY))
+        )

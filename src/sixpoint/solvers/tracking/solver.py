@@ -22,7 +22,7 @@ from sixpoint.solvers.prioritized.tasks import PostureTask
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.model import lower_markers
 from sixpoint.solvers.tracking.priorities import PRIORITIES
-from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine
+from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine, join, reverse
 from sixpoint.solvers.tracking.start import place_base, refuse_strays
 from sixpoint.solvers.tracking.two_sided import blend
 
@@ -189,7 +189,7 @@ class MarkerTracker:
             state.speed[:, :3] *= -1.0
             state.lag[:] = 0.0
             back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done))
-            out = blend(self.body, self.model, out, Followed(*(array[::-1] for array in back)), markers, rate)
+            out = blend(self.body, self.model, out, reverse(back), markers, rate)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)
@@ -199,14 +199,12 @@ class MarkerTracker:
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
         self.solve(places, self.solve(places), 0.01)
 
-    def _follow(
-        self, markers: Array, dt: float, progress: Callable[[int], None]
-    ) -> tuple[Followed, State]:
+    def _follow(self, markers: Array, dt: float, progress: Callable[[int], None]) -> tuple[Followed, State]:
         """Once through the frames; those before the first with enough markers take its pose."""
         first = next((f for f, frame in enumerate(markers) if _enough(frame)), 0)
         begun, state = self._begin(markers[first])
         rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done))
-        out = Followed(*(np.concatenate(arrays) for arrays in zip(*[begun] * (first + 1), rest, strict=True)))
+        out = join([begun] * (first + 1) + [rest])
         out.flags[:first] = np.where(np.isfinite(markers[:first, :, 0]), tp.REJECTED, tp.LOST)
         out.residual[:first] = 0.0
         return out, state
@@ -218,10 +216,10 @@ class MarkerTracker:
             chunk = markers[start : start + CHUNK]
             parts.append(self._engine.run(chunk, self._rest, state, self._options_at(dt)))
             progress(start + len(chunk))
-        return Followed(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        return join(parts)
 
     def _begin(self, markers: Array) -> tuple[Followed, State]:
-        """A first frame: all markers at one level, from the neutral pose at the pelvis; strays are left out."""
+        """A first frame: all markers at one level, from the neutral pose; strays are left out."""
         seen = markers.copy()
         for _ in range(STRAYS):
             out, pose = self._begin_with(seen)
@@ -258,7 +256,7 @@ class MarkerTracker:
     def _checked(self, markers: Array) -> Array:
         if markers.ndim != 3 or markers.shape[1:] != (len(self.names), 3) or len(markers) == 0:
             raise TargetError(
-                f"markers are ({len(self.names)}, 3) in every frame, NaN where not seen; got {markers.shape[1:]}"
+                f"markers are ({len(self.names)}, 3) a frame, NaN where not seen; got {markers.shape[1:]}"
             )
         with np.errstate(invalid="ignore"):
             seen = np.all(np.abs(markers) < FAR, axis=-1, keepdims=True)

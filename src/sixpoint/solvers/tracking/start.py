@@ -18,7 +18,7 @@ TIMES = 5.0  # unless others are as far: this times their median
 
 
 def place_base(body: Articulation, model: MarkerModel, markers: Array) -> Array:
-    """The neutral state, turned and moved so that the pelvis' markers fit, or all markers where it has few."""
+    """The neutral state, turned and moved to the pelvis' markers, or to all markers where it has few."""
     figure = model.figure
     state = body.rest_state()
     places = figure.rest_positions[model.joints] + rot.mul_vec(figure.neutral[model.joints], model.offsets)

@@ -34,8 +34,7 @@ def blend(
     doubt = doubt_of(ahead.flags, rate) @ carries, doubt_of(back.flags[::-1], rate)[::-1] @ carries
     share = (doubt[0] + EVEN) / (doubt[0] + doubt[1] + 2 * EVEN)
     # In the world: there both ways agree about what markers tell, however they bend the back to it.
-    worlds = [_world(body, way)[1] for way in (ahead, back)]
-    rotations = _local(body, _mix(*worlds, share))
+    rotations = _local(body, _mix(_world(body, ahead), _world(body, back), share))
     base = share[:, body.base, None]
     positions = (1 - base) * ahead.positions + base * back.positions
     moving, translations = body.place_base(rotations, positions)
@@ -70,14 +69,14 @@ def doubt_of(flags: NDArray[np.int64], rate: float) -> Array:
     return out
 
 
-def _world(body: Articulation, way: Followed) -> tuple[Array, Array]:
-    """Places (F, J, 3) [m] and rotations (F, J, 4) of the rig in the world."""
+def _world(body: Articulation, way: Followed) -> Array:
+    """Rotations (F, J, 4) of the rig in the world."""
     moving, translations = body.place_base(way.rotations, way.positions)
-    return body.rig.compute_transforms(way.rotations, translations, moving)
+    return body.rig.compute_transforms(way.rotations, translations, moving)[1]
 
 
 def _local(body: Articulation, world: Array) -> Array:
-    """Local rotations of world rotations (F, J, 4); hinges keep what they can express, within their ranges."""
+    """Local rotations of world rotations (F, J, 4); hinges keep what they can express."""
     local = rot.mul(rot.inv(world[:, np.maximum(body.tree.parents, 0)]), world)
     local[:, 0] = world[:, 0]
     for joint, dof in body.dofs.joints.items():

@@ -49,7 +49,7 @@ def predict(m, state, speed, dt):
 
 @helper
 def update_speed(m, state, before, speed, table, flags, dt):
-    """Rates of change from two states; of joints that carry no seen marker they fade, of those that return too."""
+    """Rates of change from two states; they fade where no marker tells, or one is just back."""
     joints = len(m.parent)
     for j in range(joints):
         speed[joints + 1 + j, 3] = 0.0
@@ -152,7 +152,22 @@ def improve(
         if o.posture > 0.0 and (n == 0 or o.cold):
             posture = step + 1
             posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
-        solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, part == RETURNED, speed)
+        solve_step(
+            m,
+            w,
+            balls,
+            index,
+            values,
+            clusters,
+            forced,
+            state,
+            damping,
+            o,
+            posture,
+            normal,
+            part == RETURNED,
+            speed,
+        )
         scale_step(m, w, settings, step, 1.0)
         copy_rows(state, old)
         retract(m, w, state, step)
@@ -236,8 +251,8 @@ def track_markers(
         )  # fmt: skip
         if part == OTHERS:
             more, _ = improve(
-                m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old, rest,
-                tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
+                m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old,
+                rest, tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
             )  # fmt: skip
             iterations[f] += more
             arrived = more < MORE

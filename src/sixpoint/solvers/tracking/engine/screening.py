@@ -122,7 +122,7 @@ def exchange(w, table, numbers, memory, flags, goal, ahead):
 
 @helper
 def readmit(segments, memory, flags, s, dt):
-    """A segment most of whose markers are refused is where they are; and patience with a stubborn one ends."""
+    """A segment most of whose markers are refused is where they are; patience with a stubborn one ends."""
     first, count = segments[s, tp.FIRST], segments[s, tp.COUNT]
     used, refused = 0, 0
     for i in range(first, first + count):

@@ -39,7 +39,7 @@ def set_pace(lag, row):
 
 @helper
 def take_up(m, state, expected, lag, speed, dt, arrived):
-    """Fade what is left, and add what joints that are back were off by in this frame; the last, if they arrived."""
+    """Fade what is left; add what joints that are back were off by, the last time once they arrived."""
     joints = len(m.parent)
     for row in range(2 * joints + 1):
         fade_row(lag, row, dt)

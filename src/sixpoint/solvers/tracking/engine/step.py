@@ -146,7 +146,7 @@ def solve_equalities(m, w, index, forced, fixed, basis):
 
 @helper
 def force_clusters(w, index, values, clusters, forced, step):
-    """Make equalities of clusters that the step leaves farther off than their tolerance; whether there are."""
+    """Make equalities of clusters that the step leaves off by more than they may be; whether there are."""
     found = False
     for k in range(len(clusters)):
         b = clusters[k, tp.MOVE]
@@ -170,7 +170,7 @@ def force_clusters(w, index, values, clusters, forced, step):
 
 @helper
 def hold_others(m, w, speed):
-    """Lock all but the joints that are back after a gap: these come to the rest of the body, not it to them."""
+    """Lock all but the joints that are back after a gap: they come to the body, not it to them."""
     if m.free and speed[m.base, 3] == 0.0:
         for c in range(3):
             w.locked[c] = 1
