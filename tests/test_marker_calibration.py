@@ -256,6 +256,10 @@ def test_exchanged_sides_are_reported():
         calibrate_markers(shuffled(worn.markers, swap))
     with pytest.raises(TargetError, match="LKNE and RKNE"):
         calibrate_markers(shuffled(worn.markers, {"LKNE": "RKNE", "RKNE": "LKNE"}))
+    with pytest.raises(TargetError, match="swapped: LWRA and RWRA;"):
+        calibrate_markers(shuffled(worn.markers, {"LWRA": "RWRA", "RWRA": "LWRA"}))
+    with pytest.raises(TargetError, match="swapped: LANK and RANK;"):
+        calibrate_markers(shuffled(worn.markers, {"LANK": "RANK", "RANK": "LANK"}))
 
 
 # --- recordings -----------------------------------------------------------------------------------

@@ -27,6 +27,7 @@ PROPORTION_STD = {  # of the logarithm of each length, the stature apart
     "hand": 0.06,
 }
 LOOSE = 2.0  # postures of a movement may be this many times as far from neutral as the kinematics' priors say
+STIFF = {"l_sternoclavicular": 1.5, "r_sternoclavicular": 1.5, "vt6": 2.0}  # these no farther, in any frame
 STATIC_STD = {"l_knee": 6, "r_knee": 6, "l_ankle": 8, "r_ankle": 8, "vl5": 8, "vt6": 8, "vc4": 12}  # [deg]
 
 
@@ -50,7 +51,10 @@ def expect_lengths(stature: float, hips: float | None) -> tuple[Array, Array]:
 
 def moving_std(kinematics: Kinematics, frames: int) -> Array:
     """(F, D) standard deviations of postures in a movement, whose frames are far from independent."""
-    return np.tile(kinematics.std * LOOSE * max(1.0, frames / INDEPENDENT) ** 0.5, (frames, 1))
+    std = kinematics.std * LOOSE * max(1.0, frames / INDEPENDENT) ** 0.5
+    for joint, times in STIFF.items():
+        std[kinematics.dofs(joint)] = times * kinematics.std[kinematics.dofs(joint)]
+    return np.tile(std, (frames, 1))
 
 
 def standing_std(kinematics: Kinematics, frames: int) -> Array:

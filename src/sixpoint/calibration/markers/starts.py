@@ -124,7 +124,7 @@ def _lay_limb(
         y = -upper
         x = rot.unit(side - np.sum(side * y, axis=1, keepdims=True) * y)
         new = np.stack([x, y, np.cross(x, y)], axis=-1)
-        good = np.isfinite(middle).all(axis=1)
+        good = np.asarray(np.isfinite(middle).all(axis=1))
         turned = np.where(good[:, None, None], new, above)
     poses[good, kin.dofs(limb[0])] = logarithm(np.swapaxes(above, 1, 2) @ turned)[good]
     flexion = np.arctan2(np.sum(bend * turned[..., 0], axis=1), np.sum(upper * lower, axis=1))
