@@ -134,7 +134,6 @@ def test_a_replay_keeps_the_pace(files):
             last is not None
             and session.statistics.poses + session.statistics.counts["frames left out"] == FRAMES
         )
-        assert session.statistics.poses > FRAMES // 2
 
 
 def test_a_late_loop_leaves_frames_out():

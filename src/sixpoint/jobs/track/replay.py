@@ -114,6 +114,9 @@ class _Page:
         self._server: Any = open_server()
         self._scene = Scene(self._server, lambda what, value: None)
         self._scene.set_figure(tracker.figure)
+        middle = np.nanmean(positions, axis=(0, 1))
+        if np.isfinite(middle).all():
+            self._scene.look_at(middle)
         self._positions = positions
         self._line = self._server.gui.add_markdown("waiting for the first frame")
         self.address = describe_address(self._server)[0]

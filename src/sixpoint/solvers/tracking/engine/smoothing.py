@@ -11,8 +11,8 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
 
-PACE = 0.3  # time for each radian or metre of a jump [s]
-QUICKEST, SLOWEST = 0.06, 0.5  # of it [s]
+PACE = 0.45  # time for each radian or metre of a jump [s]
+QUICKEST, SLOWEST = 0.06, 0.7  # of it [s]
 GONE = 1e-4  # what is less is nothing [rad, m]
 
 
