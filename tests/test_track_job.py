@@ -126,6 +126,27 @@ def test_what_excludes_each_other_is_said(files, tmp_path):
     assert not (tmp_path / "a.bvh").exists()
 
 
+def test_a_recording_without_samples_says_so(files, tmp_path):
+    """All-missing markers are an error that says what a body needs."""
+    names = body("walk").model.names
+    empty = Markers(names, np.full((4, len(names), 3), np.nan), 100.0, name="empty")
+    save_markers(empty, tmp_path / "empty.npz")
+    with pytest.raises(SixpointError, match="no frame has three of the model's markers"):
+        track(tmp_path / "empty.npz", tmp_path / "a.bvh", following=following(files))
+
+
+def test_a_batch_follows_markers(files, tmp_path):
+    """The job of a batch takes the command's options and tells what a summary needs."""
+    from sixpoint.jobs.batch import tracking
+
+    options = {"model": files[1], "frames": "0:30", "no_limits": True}
+    tracking.check(options)
+    told = tracking.run_one(files[0], tmp_path / "a.bvh", options)
+    assert told["frames"] == 30 and told["residual"] < 0.005 and told["markers"] == 41
+    with pytest.raises(SixpointError, match="no such file"):
+        tracking.check({"model": tmp_path / "none.toml"})
+
+
 def test_a_replay_keeps_the_pace(files):
     """Replayed live, every frame that is not left out is solved, and poses are those of a stream."""
     with replay(files[0], following=following(files)) as session:

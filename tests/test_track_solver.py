@@ -171,6 +171,14 @@ def test_nothing_seen_is_survived(tracker):
     assert np.all(np.isfinite(empty.pose.rotations)) and np.all(empty.flags == LOST)
 
 
+def test_one_frame_is_enough(tracker):
+    """A recording of a single frame is posed, also when a marker is missing."""
+    markers = body("walk").markers[:1].copy()
+    assert len(tracker.solve_frames(markers, 100.0).motion) == 1
+    markers[0, 3] = np.nan
+    assert len(tracker.solve_frames(markers, 100.0).motion) == 1
+
+
 @given(
     arrays(float, (3, 41, 3), elements=st.floats(allow_nan=True, allow_infinity=True)),
     st.floats(allow_nan=True, allow_infinity=True),

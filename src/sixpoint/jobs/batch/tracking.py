@@ -71,8 +71,9 @@ def check(options: Mapping[str, Any]) -> None:
 
 def warm_up(options: Mapping[str, Any]) -> None:
     """Compile the tracker's kernels, on three markers of the pelvis."""
-    offsets = [(0.1, 0.0, 0.1), (-0.1, 0.0, 0.1), (0.0, 0.0, -0.1)]
-    model = MarkerModel(Figure.from_stature(), ("a", "b", "c"), [0, 0, 0], offsets, [0.01] * 3)
+    offsets = np.array([(0.1, 0.0, 0.1), (-0.1, 0.0, 0.1), (0.0, 0.0, -0.1)])
+    joints, spread = np.zeros(3, np.int64), np.full(3, 0.01)
+    model = MarkerModel(Figure.from_stature(), ("a", "b", "c"), joints, offsets, spread)
     MarkerTracker(model, limits=not options.get("no_limits", False)).warm_up()
 
 
