@@ -127,9 +127,11 @@ def test_what_excludes_each_other_is_said(files, tmp_path):
 
 
 def test_a_recording_without_samples_says_so(files, tmp_path):
-    """All-missing markers are an error that says what a body needs."""
+    """Frames with two markers are an error that says what a body needs."""
     names = body("walk").model.names
-    empty = Markers(names, np.full((4, len(names), 3), np.nan), 100.0, name="empty")
+    positions = np.full((4, len(names), 3), np.nan)
+    positions[:, :2] = body("walk").markers[:4, :2]
+    empty = Markers(names, positions, 100.0, name="empty")
     save_markers(empty, tmp_path / "empty.npz")
     with pytest.raises(SixpointError, match="no frame has three of the model's markers"):
         track(tmp_path / "empty.npz", tmp_path / "a.bvh", following=following(files))
