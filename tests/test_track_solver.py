@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.errors import FigureError, SixpointError, TargetError
+from sixpoint.kernels.linear import solve_normal
 from sixpoint.solvers.tracking.priorities import find_parts
 from sixpoint.solvers.tracking.solver import LOST, REJECTED, SWAPPED, MarkerTracker
 from track_bodies import body, drop, markers_of
@@ -256,3 +257,15 @@ def test_markers_of_a_motion_are_where_the_model_says():
     case = body("walk")
     assert isinstance(case.model, MarkerModel)
     assert np.allclose(markers_of(case.model, case.motion), case.model.place(*case.motion.transforms))
+
+
+def test_damped_least_squares_are_those_of_numpy():
+    """``solve_normal`` minimises |L y - b|^2 + d^2 |y|^2."""
+    rng, count, rank, damping = np.random.default_rng(0), 7, 4, 0.3
+    small = np.zeros((2 * count + 3, count))
+    left, right = rng.normal(size=(count, rank)), rng.normal(size=count)
+    small[:count, :rank], small[-3, :count] = left, right
+    solve_normal(small, count, rank, 2 * count, 2 * count + 2, damping)
+    stacked = np.vstack([left, damping * np.eye(rank)])
+    best = np.linalg.lstsq(stacked, np.append(right, np.zeros(rank)), rcond=None)[0]
+    assert np.allclose(small[-1, :rank], best)
