@@ -16,6 +16,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.flesh import build_shape
 from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
 from sixpoint.body.limits import Limits
+from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.marker_roles import MarkerRoles, find_marker_roles
 from sixpoint.body.markers import Event, Markers
 from sixpoint.body.motion import Motion, Pose
@@ -23,6 +24,7 @@ from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.calibrate import calibrate
+from sixpoint.calibration.markers import calibrate_markers
 from sixpoint.calibration.mounts import Calibration, Mount
 from sixpoint.errors import FigureError, FormatError, SixpointError, SkeletonError, TargetError
 from sixpoint.formats import (
@@ -37,6 +39,7 @@ from sixpoint.formats import (
     save_markers,
     save_targets,
 )
+from sixpoint.jobs.marker_models import load_marker_model, save_marker_model
 from sixpoint.jobs.retarget import retarget
 from sixpoint.samples import SAMPLES, make_sample
 from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
@@ -68,6 +71,7 @@ from sixpoint.solvers.sequential_prior.solver import SequentialIKPrior
 from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.solvers.tgb.limb import AnalyticLimb
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
+from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedFrame, TrackedMotion
 from sixpoint.study.metrics import Errors, compute_errors
 
 __version__ = "0.1.0"
@@ -106,7 +110,9 @@ __all__ = [
     "KulpaMultonArnaldi",
     "Limits",
     "LookAtTask",
+    "MarkerModel",
     "MarkerRoles",
+    "MarkerTracker",
     "Markers",
     "Motion",
     "MotionSolution",
@@ -133,13 +139,17 @@ __all__ = [
     "TGBSequentialIK",
     "TargetError",
     "Targets",
+    "TrackedFrame",
+    "TrackedMotion",
     "build_shape",
     "calibrate",
+    "calibrate_markers",
     "compute_errors",
     "compute_joint_angles",
     "find_marker_roles",
     "load",
     "load_avatar",
+    "load_marker_model",
     "load_markers",
     "load_shape",
     "load_targets",
@@ -148,6 +158,7 @@ __all__ = [
     "retarget",
     "save",
     "save_angles",
+    "save_marker_model",
     "save_markers",
     "save_targets",
 ]

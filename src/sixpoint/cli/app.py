@@ -25,6 +25,7 @@ from sixpoint.cli.reconstruct import reconstruct
 from sixpoint.cli.render import render
 from sixpoint.cli.screen import Screen, messages
 from sixpoint.cli.study import study
+from sixpoint.cli.track import track
 from sixpoint.cli.view import view
 from sixpoint.errors import SixpointError
 
@@ -39,7 +40,8 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, view, reconstruct, render, compare, batch, convert, info, live, study, data):
+    commands = (demo, view, reconstruct, track, render, compare, batch, convert, info, live, study, data)
+    for command in commands:
         app.command(command)
     return app
 

@@ -10,20 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh import build_shape
 from sixpoint.body.motion import Motion
 from sixpoint.body.retargeting import Mode
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
-from sixpoint.formats import MOTION_SUFFIXES, OUTPUT_SUFFIXES, SHAPE_OUTPUTS, Avatar, save
+from sixpoint.formats import MOTION_SUFFIXES, OUTPUT_SUFFIXES, Avatar, save
 from sixpoint.jobs.driving import drive, open_avatar
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.solving import Solved, Solving, solve
-from sixpoint.jobs.writing import check_output, keep_sources
-from sixpoint.render.colours import paint
+from sixpoint.jobs.writing import check_output, keep_sources, save_dressed
 from sixpoint.study.metrics import Errors, compute_errors
 
 AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
@@ -123,7 +120,7 @@ def reconstruct(
     truth = None if points_only else like
     result = finish(solved.solution.motion, figure, like, truth if extras else None)
     errors = compute_errors(figure, truth, result) if truth else None
-    _save(figure, replace(result, name=out.stem), out, force)
+    save_dressed(figure, replace(result, name=out.stem), out, force)
     if picture and truth:
         _draw(figure, truth, result, picture, solving.method)
     return Reconstruction(figure, opened, targets, solved, errors, files)
@@ -145,17 +142,6 @@ def finish(result: Motion, figure: Figure, like: Motion | None, extras: Motion |
         rotations[:, figure.extremities] = extras.rotations[:, figure.extremities]
         result = replace(result, rotations=rotations)
     return result
-
-
-def _save(figure: Figure, result: Motion, out: Path, force: bool) -> None:
-    """Write a motion; where the file can hold a surface, with the figure's, or the built-in one."""
-    suffix = out.suffix.lower()
-    if suffix not in SHAPE_OUTPUTS:
-        save(result, out, force=force)
-        return
-    shape = figure.shape or build_shape(figure)
-    colours = Appearance(paint(figure, shape)) if suffix == ".glb" else None
-    save(result, out, force=force, shape=shape, appearance=colours)
 
 
 def _drive_avatar(

@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from sixpoint.body.appearance import Appearance
+from sixpoint.body.figure import Figure
+from sixpoint.body.flesh import build_shape
+from sixpoint.body.motion import Motion
 from sixpoint.errors import FormatError, listed
+from sixpoint.formats import SHAPE_OUTPUTS, save
 from sixpoint.formats.atomic import check_writable
+from sixpoint.render.colours import paint
 
 
 def check_output(path: Path, suffixes: Sequence[str], force: bool, hint: str = "") -> list[Path]:
@@ -31,6 +37,21 @@ def check_output(path: Path, suffixes: Sequence[str], force: bool, hint: str = "
     files = [path, path.with_suffix(".asf")] if suffix == ".amc" else [path]
     check_writable(files, force)
     return files
+
+
+def save_dressed(figure: Figure, motion: Motion, out: Path, force: bool) -> None:
+    """Write a motion; where the file can hold a surface, with the figure's, or the built-in one.
+
+    Raises:
+        FormatError: Nothing was written; the message says why.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in SHAPE_OUTPUTS:
+        save(motion, out, force=force)
+        return
+    shape = figure.shape or build_shape(figure)
+    colours = Appearance(paint(figure, shape)) if suffix == ".glb" else None
+    save(motion, out, force=force, shape=shape, appearance=colours)
 
 
 def prepare_folder(out: Path, force: bool, *, ours: bool = False) -> None:

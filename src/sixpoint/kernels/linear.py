@@ -237,3 +237,41 @@ def solve_damped(small, count, rank, right, answer, largest, threshold):
             along /= square + shrink * shrink
             for i in range(rank):
                 small[answer, i] += small[count + i, k] * along
+
+
+@helper
+def solve_normal(small, count, rank, right, answer, damping):
+    """Least squares by Cholesky: answer (rank,) minimises |L y - right|^2 + damping^2 |y|^2.
+
+    L = small[:count, :rank] is kept; the rows below it, up to ``2 count``, are used. ``damping`` must not be
+    zero where L may be short of rank.
+    """
+    for i in range(rank):
+        for k in range(i + 1):
+            total = damping * damping if i == k else 0.0
+            for c in range(count):
+                total += small[c, i] * small[c, k]
+            small[count + i, k] = total
+        total = 0.0
+        for c in range(count):
+            total += small[c, i] * small[right, c]
+        small[answer, i] = total
+    for i in range(rank):
+        for k in range(i + 1):
+            total = small[count + i, k]
+            for c in range(k):
+                total -= small[count + i, c] * small[count + k, c]
+            if i == k:
+                small[count + i, i] = sqrt(max(total, 1e-30))
+            else:
+                small[count + i, k] = total / small[count + k, k]
+    for i in range(rank):
+        total = small[answer, i]
+        for c in range(i):
+            total -= small[count + i, c] * small[answer, c]
+        small[answer, i] = total / small[count + i, i]
+    for i in range(rank - 1, -1, -1):
+        total = small[answer, i]
+        for c in range(i + 1, rank):
+            total -= small[count + c, i] * small[answer, c]
+        small[answer, i] = total / small[count + i, i]

@@ -131,6 +131,17 @@ class Scene:
         with self._server.atomic():
             self._handles.place(points, rotations, but=but)
 
+    def show_markers(self, points: Array, colours: Array) -> None:
+        """Draw small balls at (M, 3) [m] in colours (M, 3), 0 to 255; rows of NaN are left out."""
+        known = np.isfinite(points).all(axis=1)
+        self._server.scene.add_point_cloud(
+            "/markers",
+            points=points[known].astype(np.float32),
+            colors=colours[known].astype(np.uint8),
+            point_size=0.012,
+            point_shape="circle",
+        )
+
     def set_turns(self, turns: list[bool]) -> None:
         """Which of the six handles may be turned."""
         assert self._handles is not None, "set_figure comes first"

@@ -13,7 +13,7 @@ from sixpoint.body.dofs import Ball, Hinges, SwingTwist
 from sixpoint.errors import SixpointError, listed
 from sixpoint.kernels.swing_twist import build_ball_rows
 from sixpoint.solvers.prioritized.articulation import Articulation
-from sixpoint.solvers.prioritized.blocks import lower_task
+from sixpoint.solvers.prioritized.blocks import Block, lower_task
 from sixpoint.solvers.prioritized.engine import packing
 from sixpoint.solvers.prioritized.engine.packing import BALL, FIXED, HINGES, Model
 from sixpoint.solvers.prioritized.tasks import BalanceTask, FlextTask, PostureTask, Task
@@ -50,8 +50,15 @@ def lower(
 ) -> Lowered:
     """Lower a body and its tasks; posture is not among them."""
     blocks = [block for k, task in enumerate(tasks) for block in lower_task(body, task, k, limits)]
+    return lower_blocks(body, blocks, posture, tasks)
+
+
+def lower_blocks(
+    body: Articulation, blocks: Sequence[Block], posture: PostureTask | None, tasks: Sequence[Task]
+) -> Lowered:
+    """Lower a body and blocks of rows, most important level first; ``tasks`` say what bears on the floor."""
     wanted = sorted({block.level for block in blocks})
-    blocks.sort(key=lambda block: block.level)
+    blocks = sorted(blocks, key=lambda block: block.level)
     index = np.zeros((len(blocks), packing.BLOCK_INTEGERS), np.int64)
     values = np.zeros((len(blocks), packing.BLOCK_NUMBERS))
     row = 0

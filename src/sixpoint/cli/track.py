@@ -1,0 +1,161 @@
+"""``sixpoint track``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from sixpoint.cli.options import Force, Frames, NoLimits, Rate, Unit
+from sixpoint.cli.screen import Screen
+
+if TYPE_CHECKING:
+    from sixpoint.jobs.track.job import Tracking
+
+WORST = 12  # markers listed on the screen
+
+
+def track(
+    file: Annotated[
+        Path, Parameter(help="Labelled markers: .c3d, .trc, .csv, .npz, or .json of a pose estimator.")
+    ],
+    /,
+    *,
+    out: Annotated[
+        Path | None,
+        Parameter(
+            name=("--out", "-o"),
+            help="A motion (.bvh, .amc, .glb, .usd ...), or joint angles as .mot or .csv; by default "
+            "`<name>_tracked.bvh` in this folder.",
+        ),
+    ] = None,
+    model: Annotated[
+        Path | None, Parameter(help="A saved marker model; by default one is calibrated on the recording.")
+    ] = None,
+    static: Annotated[
+        Path | None, Parameter(help="The same person and markers standing still, to calibrate on.")
+    ] = None,
+    layout: Annotated[
+        Path | None,
+        Parameter(help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`.'),
+    ] = None,
+    markers: Annotated[
+        str | None, Parameter(help="Follow these labels only: LASI,RASI,LKNE; by default all with a role.")
+    ] = None,
+    frames: Frames = None,
+    no_limits: NoLimits = False,
+    cutoff: Annotated[
+        float | None, Parameter(help="Filter the markers at this frequency [Hz], without delay: 6 for gait.")
+    ] = None,
+    lock_feet: Annotated[bool, Parameter(negative="", help="Hold feet still while they stand.")] = False,
+    six: Annotated[
+        bool, Parameter(negative="", help="Reduce the markers to the six points, and pose by these alone.")
+    ] = False,
+    method: Annotated[str, Parameter(help="With --six: how to solve, as of `reconstruct`.")] = "sik+",
+    picture: Annotated[
+        Path | None, Parameter(help="Also draw body and markers at some frames, to this .png.")
+    ] = None,
+    report: Annotated[
+        Path | None,
+        Parameter(help="Also write a report into this folder: residuals by marker, with pictures."),
+    ] = None,
+    live: Annotated[
+        bool, Parameter(negative="", help="Replay it at its own rate, solved frame by frame; writes nothing.")
+    ] = False,
+    view: Annotated[
+        bool, Parameter(negative="", help="Show the replay in the browser, over and over; implies --live.")
+    ] = False,
+    unit: Unit = None,
+    up: Annotated[
+        str | None, Parameter(help="Up axis of the file: x, y, z, or one with a minus; by default guessed.")
+    ] = None,
+    rate: Rate = None,
+    force: Force = False,
+) -> None:
+    """Follow the markers of a laboratory recording with a whole body, and write it.
+
+    The person's lengths and the places of the markers are calibrated on the recording itself, on a static
+    trial (--static), or known already (--model). Feet, pelvis, hands and head count before the rest; gaps
+    are bridged, ghosts and swapped markers refused and reported.
+
+    For example:
+
+    ```
+    sixpoint track walk.c3d -o walk.bvh --report walk_report
+    sixpoint track walk.trc --static static.trc -o walk.mot --cutoff 6
+    sixpoint track dance.c3d --six --method sik-prior
+    sixpoint track walk.c3d --view
+    ```
+    """
+    from sixpoint.jobs.reading import ALL, Reading, parse_frames
+    from sixpoint.jobs.solving import Solving
+    from sixpoint.jobs.track.job import track as run
+    from sixpoint.jobs.track.options import Following, parse_labels
+
+    labels = () if markers is None else parse_labels(markers)
+    following = Following(model, static, layout, labels, not no_limits, cutoff, lock_feet)
+    reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
+    screen = Screen()
+    if live or view:
+        _replay(screen, file, reading, following, view)
+        return
+    with screen.progress() as progress:
+        done = run(
+            file,
+            out,
+            reading=reading,
+            following=following,
+            six=Solving(method, limits=not no_limits) if six else None,
+            picture=picture,
+            report=report,
+            force=force,
+            progress=progress,
+        )
+    _show(screen, file, done)
+
+
+def _replay(screen: Screen, file: Path, reading: object, following: object, view: bool) -> None:
+    from sixpoint.jobs.track.replay import replay
+
+    if view:
+        from sixpoint.cli.view import check_viser
+
+        check_viser()
+    with screen.progress() as progress:
+        session = replay(file, reading, following, view=view, progress=progress)  # type: ignore[arg-type]
+    with session:
+        if session.address:
+            screen.say(f"open {session.address} in a browser; Ctrl-C ends it", style="bold")
+        session.run(lambda line: screen.note(line, "live") if view else None)
+    solving = [1e3 * session.statistics.percentile("solving", share) for share in (50, 99)]
+    late = session.statistics.counts["frames left out"]
+    screen.rows(
+        [
+            ("live", session.statistics.line()),
+            (
+                "solving",
+                f"median {solving[0]:.2f}, p99 {solving[1]:.2f} ms; a frame is {1e3 / session.rate:.2f} ms",
+            ),
+            ("left out", f"{late} frames" if late else "no frame"),
+        ]
+    )
+
+
+def _show(screen: Screen, file: Path, done: Tracking) -> None:
+    from sixpoint.cli import describe
+    from sixpoint.jobs.track.report import COLUMNS, describe_tracking, row_cells
+    from sixpoint.study.tracking import summarise_markers
+
+    screen.say(f"{file}: {describe.describe_length(len(done.markers), done.markers.rate)}", style="bold")
+    screen.rows(describe_tracking(done))
+    rows = summarise_markers(done.model.names, done.tracked.residual, done.tracked.flags)
+    shown = [row for k, row in enumerate(rows) if k < WORST or row.refused or row.swapped]
+    screen.say("markers, the worst first" if len(shown) < len(rows) else "markers", style="bold")
+    screen.table(COLUMNS, [row_cells(row) for row in shown])
+    if done.six is not None:
+        targets, solved, borrowed = done.six
+        note = f"; {', '.join(borrowed)} mostly placed by the followed body" if borrowed else ""
+        screen.say(f"six points{note}", style="bold")
+        screen.rows(describe.describe_solved(solved, targets))
+    screen.say(describe.describe_files(done.files), style="green")

@@ -1,0 +1,1 @@
+"""Marker recordings: followed, reported, reduced to six points, replayed live."""

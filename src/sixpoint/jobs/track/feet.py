@@ -1,0 +1,71 @@
+"""Feet that stand do not slide: their markers are held while both heel and toe are on the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.motion import Motion
+from sixpoint.signals.contacts import find_contacts
+from sixpoint.solvers.tracking.priorities import find_parts
+
+Array = NDArray[np.float64]
+
+FADE = 0.06  # time in which a foot goes over from moving to standing, and back [s]
+TIGHT = {"feet": 1e-4}
+"""Tolerance that holds feet where their markers are held [m]."""
+
+
+def find_stances(model: MarkerModel, motion: Motion) -> NDArray[np.bool_]:
+    """(F, 2) frames in which the left and the right foot stand flat: ankle and toes rest."""
+    figure = model.figure
+    feet = [figure.skeleton.subtree(ankle) for ankle in figure.roles.ankle]
+    points = [int(j) for foot in feet for j in (foot[0], foot[-1])]
+    rest = find_contacts(motion.positions[:, points], motion.rate)
+    return np.stack([rest[:, 0] & rest[:, 1], rest[:, 2] & rest[:, 3]], axis=1)
+
+
+def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Markers (F, M, 3) with those of standing feet where the foot is on average of its stance.
+
+    Returns:
+        The markers, and (F, 2) the frames in which a foot is held.
+    """
+    stances, held = find_stances(model, motion), markers.copy()
+    positions, world = motion.transforms
+    neutral = model.place(*model.figure.neutral_pose.compute_transforms())
+    places = neutral - model.figure.neutral_pose.compute_transforms()[0][model.figure.roles.pelvis]
+    feet = np.array(find_parts(model.figure, model.joints, places)) == "feet"
+    for k, ankle in enumerate(model.figure.roles.ankle):
+        mine = np.flatnonzero(np.isin(model.joints, model.figure.skeleton.subtree(ankle)))
+        knee = model.figure.roles.knee[k]
+        malleoli = np.flatnonzero(feet & (model.joints == knee))
+        for start, stop in _runs(stances[:, k]):
+            part = slice(start, stop)
+            turn, place = rot.mean(world[part, ankle]), positions[part, ankle].mean(axis=0)
+            moved = rot.mul(turn, rot.inv(world[part, ankle]))
+            share = _share(stop - start, motion.rate)[:, None]
+            for i in mine:
+                there = place + rot.mul_vec(moved, markers[part, i] - positions[part, ankle])
+                still = np.nanmean(there, axis=0) if np.isfinite(there).any() else there[0]
+                held[part, i] = (1 - share) * markers[part, i] + share * still
+            for i in malleoli:  # the shank turns about them
+                if np.isfinite(markers[part, i]).any():
+                    still = np.nanmean(markers[part, i], axis=0)
+                    held[part, i] = (1 - share) * markers[part, i] + share * still
+    return held, stances
+
+
+def _share(frames: int, rate: float) -> Array:
+    """How far a foot is held in each frame of a stance: it begins and ends gently."""
+    edge = np.minimum(np.arange(frames) + 1.0, np.arange(frames, 0, -1.0)) / (FADE * rate)
+    x = np.clip(edge, 0.0, 1.0)
+    return np.asarray(x * x * (3 - 2 * x))
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one past the last frame of every run of set flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

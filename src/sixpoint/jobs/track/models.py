@@ -1,0 +1,76 @@
+"""Who moves: a saved marker model, or one calibrated on the spot; and its markers in a recording."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers import Markers
+from sixpoint.calibration.markers import calibrate_markers
+from sixpoint.errors import TargetError, listed
+from sixpoint.formats import load_markers
+from sixpoint.jobs.marker_models import load_marker_model
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.track.options import Following
+
+Array = NDArray[np.float64]
+
+log = logging.getLogger("sixpoint")
+
+FEWEST = 3
+"""A recording with fewer markers of the model says nothing about a body."""
+
+
+def find_model(markers: Markers, following: Following, progress: Progress = silent) -> MarkerModel:
+    """The saved model, or a calibration on the static trial or the recording itself."""
+    if following.model is not None:
+        model = load_marker_model(following.model)
+    else:
+        static = None if following.static is None else load_markers(following.static)
+        model = calibrate_markers(markers, static, following.layout, progress=progress)
+    return select_markers(model, following.markers) if following.markers else model
+
+
+def select_markers(model: MarkerModel, names: tuple[str, ...]) -> MarkerModel:
+    """The model with some of its markers only.
+
+    Raises:
+        TargetError: A marker is not in the model; the message lists those that are.
+    """
+    unknown = [name for name in names if name not in model.names]
+    if unknown:
+        raise TargetError(f"no marker {listed(unknown)} in the model; there are: {listed(model.names)}")
+    chosen = [model.names.index(name) for name in dict.fromkeys(names)]
+    return MarkerModel(
+        model.figure,
+        tuple(model.names[k] for k in chosen),
+        model.joints[chosen],
+        model.offsets[chosen],
+        model.spread[chosen],
+        model.missing,
+    )
+
+
+def columns_of(model: MarkerModel, markers: Markers) -> Array:
+    """(F, M, 3) positions of the model's markers [m], NaN for one that the recording does not have.
+
+    Raises:
+        TargetError: The recording has fewer than three of them.
+    """
+    there = [name for name in model.names if name in markers.names]
+    if len(there) < FEWEST:
+        raise TargetError(
+            f"{markers.name}: only {len(there)} of the model's {len(model.names)} markers are there "
+            f"({listed(markers.names)}); following needs {FEWEST}, three on the pelvis to begin with"
+        )
+    absent = [name for name in model.names if name not in markers.names]
+    if absent:
+        log.warning("markers of the model that the recording does not have: %s", listed(absent))
+    out = np.full((len(markers), len(model.names), 3), np.nan)
+    for k, name in enumerate(model.names):
+        if name in markers.names:
+            out[:, k] = markers.positions[:, markers.index(name)]
+    return out

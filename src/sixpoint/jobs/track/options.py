@@ -1,0 +1,47 @@
+"""How markers are followed, checked before any file is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sixpoint.errors import SixpointError
+
+
+@dataclass(frozen=True)
+class Following:
+    """How to follow.
+
+    Attributes:
+        model: A saved marker model; None: calibrated on the static trial, or on the recording itself.
+        static: A recording of the same person and markers, standing still.
+        layout: A TOML table marker label -> role.
+        markers: Labels to use; empty for all that have a role.
+        limits: Keep joints within their limits.
+        cutoff: Filter the markers without delay at this frequency [Hz]; None for not at all.
+        lock_feet: Hold feet still while they stand.
+    """
+
+    model: Path | None = None
+    static: Path | None = None
+    layout: Path | None = None
+    markers: tuple[str, ...] = ()
+    limits: bool = True
+    cutoff: float | None = None
+    lock_feet: bool = False
+
+    def check(self) -> None:
+        """Refuse what excludes each other.
+
+        Raises:
+            SixpointError: The message says what.
+        """
+        if self.model is not None and (self.static is not None or self.layout is not None):
+            raise SixpointError("--model is calibrated already: leave out --static and --layout")
+        if self.cutoff is not None and not self.cutoff > 0:
+            raise SixpointError(f"the cutoff is a positive frequency [Hz], got {self.cutoff}")
+
+
+def parse_labels(text: str) -> tuple[str, ...]:
+    """Marker labels as ``LASI,RASI,LKNE``."""
+    return tuple(filter(None, (word.strip() for word in text.split(","))))

@@ -1,0 +1,280 @@
+"""The loop of one frame of markers, and the compiled entry: frames of markers in, poses out."""
+
+from math import exp
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import entry, helper
+from sixpoint.solvers.prioritized.engine import packing as pk
+from sixpoint.solvers.prioritized.engine.frame import posture_wish
+from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges, retract
+from sixpoint.solvers.prioritized.engine.limits import hold_limits
+from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, unpack_model, unpack_scratch
+from sixpoint.solvers.prioritized.engine.step import scale_step
+from sixpoint.solvers.prioritized.engine.wishes import OFF
+from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
+from sixpoint.solvers.tracking.engine.packing import unpack_options
+from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
+from sixpoint.solvers.tracking.engine.smoothing import let_go, take_up
+from sixpoint.solvers.tracking.engine.step import solve_step
+
+COAST = 0.05  # what no marker sees goes on for about so long [s]
+SMOOTH = 0.02  # rates of change are means over about so long [s]
+SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
+ALL, OTHERS, RETURNED = 0, 1, 2
+MORE = 25  # iterations in which only what is back after a gap moves
+CAUTIOUS = 0.1  # their damping at first: the way may be far [m]
+TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
+PENALTY = 100.0  # weight of what exceeds a tolerance
+WORSE, SLACK = 1.01, 1e-5  # a merit beyond this share and sum [m^2] is worse: the posture moves a little
+STIFFEST = 1.0  # largest damping [m]
+CAP = 6.0  # largest speed towards the posture [rad/s]
+
+
+@helper
+def predict(m, state, speed, dt):
+    """Move the state on at its rates of change."""
+    joints = len(m.parent)
+    for k in range(3):
+        state[joints, k] += dt * speed[joints, k]
+    for j in range(joints):
+        if m.kind[j] == BALL:
+            turn = qt.exp((dt * speed[j, 0], dt * speed[j, 1], dt * speed[j, 2]))
+            qt.store(state, j, qt.normalised(qt.mul(turn, qt.load(state, j))))
+        elif m.kind[j] == HINGES:
+            for k in range(m.size[j]):
+                state[joints + 1 + j, k] += dt * speed[joints + 1 + j, k]
+
+
+@helper
+def update_speed(m, state, before, speed, table, flags, dt):
+    """Rates of change from two states; they fade where no marker tells, or one is just back."""
+    joints = len(m.parent)
+    for j in range(joints):
+        speed[joints + 1 + j, 3] = 0.0
+    for i in range(len(flags)):
+        if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
+            j = table[i, tp.JOINT]
+            while j >= 0 and speed[joints + 1 + j, 3] == 0.0:
+                speed[joints + 1 + j, 3] = 1.0
+                j = m.parent[j]
+    usual = dt / (SMOOTH + dt)
+    fade = exp(-dt / COAST)
+    for j in range(joints):
+        keep, share = 1.0, usual
+        if speed[joints + 1 + j, 3] == 0.0:
+            keep = fade
+        if speed[j, 3] > 0.0:  # it moves to where it is, not as it is
+            keep, share = fade, 0.0
+        if j == m.base:
+            for k in range(3):
+                rate = (state[joints, k] - before[joints, k]) / dt
+                speed[joints, k] = keep * (speed[joints, k] + share * (rate - speed[joints, k]))
+        if m.kind[j] == BALL:
+            turn = qt.log(qt.mul(qt.load(state, j), qt.inv(qt.load(before, j))))
+            for k in range(3):
+                speed[j, k] = keep * (speed[j, k] + share * (turn[k] / dt - speed[j, k]))
+        elif m.kind[j] == HINGES:
+            row = joints + 1 + j
+            for k in range(m.size[j]):
+                rate = (state[row, k] - before[row, k]) / dt
+                speed[row, k] = keep * (speed[row, k] + share * (rate - speed[row, k]))
+
+
+@helper
+def largest_step(m, w, step):
+    """Largest change of a coordinate in a row."""
+    largest = 0.0
+    for c in range(len(m.hinges)):
+        largest = max(largest, abs(w.rows[step, c]))
+    return largest
+
+
+@helper
+def copy_rows(source, target):
+    for i in range(len(source)):
+        for k in range(4):
+            target[i, k] = source[i, k]
+
+
+@helper
+def merit(w, values, clusters, numbers, memory, flags, goal, part, speed):
+    """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
+    total = 0.0
+    for k in range(len(clusters)):
+        joint, first, count = clusters[k, tp.JOINT], clusters[k, tp.FIRST], clusters[k, tp.COUNT]
+        weight, centre = 0.0, (0.0, 0.0, 0.0)
+        if part == OTHERS and speed[joint, 3] > 0.0:
+            continue
+        for i in range(first, first + count):
+            if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
+                local = place_in_joint(numbers, memory, i)
+                place = vec.add(vec.load(w.position, joint), qt.mul_vec(qt.load(w.rotation, joint), local))
+                error = vec.sub(vec.load(goal, i), place)
+                weight += numbers[i, tp.WEIGHT]
+                centre = vec.madd(centre, numbers[i, tp.WEIGHT], error)
+                total += numbers[i, tp.WEIGHT] * vec.dot(error, error)
+        if weight > 0.0 and clusters[k, tp.LAST] == 0:
+            tolerance = values[clusters[k, tp.MOVE], pk.TOLERANCE]
+            beyond = max(vec.norm(centre) / weight - tolerance, 0.0)
+            total += PENALTY * weight * beyond * beyond
+    return total
+
+
+@helper
+def improve(
+    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, rest, tensor,
+    normal, damping, part, speed, o,
+):  # fmt: skip
+    """Iterate one frame; returns the iterations and the damping that the next one begins with.
+
+    ``part`` says whether all clusters count, those of joints that are back after a gap not, or only such
+    joints move.
+
+    Where a step makes things worse, limits that it ran into made it so: it is taken back, and the next one is
+    more damped (Levenberg, Marquardt).
+    """
+    step = len(w.row) + 1
+    settings = Settings(o.limits, 1.0, TURN, SHIFT, 1e-4, o.posture, CAP * o.dt, False, o.most, 1, 1)
+    if o.limits:
+        hold_limits(m, balls, state)
+    compute_world(m, w, state)
+    here = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
+    most = o.most if part != RETURNED else MORE
+    for n in range(most):
+        for k in range(len(clusters)):
+            build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
+            if part == OTHERS and speed[clusters[k, tp.JOINT], 3] > 0.0:
+                w.block[clusters[k, tp.MOVE], 2] = OFF
+                w.block[clusters[k, tp.TURN], 2] = OFF
+        posture = -1
+        if o.posture > 0.0 and (n == 0 or o.cold):
+            posture = step + 1
+            posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
+        solve_step(
+            m,
+            w,
+            balls,
+            index,
+            values,
+            clusters,
+            forced,
+            state,
+            damping,
+            o,
+            posture,
+            normal,
+            part == RETURNED,
+            speed,
+        )
+        scale_step(m, w, settings, step, 1.0)
+        copy_rows(state, old)
+        retract(m, w, state, step)
+        if o.limits:
+            hold_limits(m, balls, state)
+        compute_world(m, w, state)
+        there = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
+        if there > WORSE * here + SLACK:
+            copy_rows(old, state)
+            compute_world(m, w, state)
+            damping = min(4.0 * damping, STIFFEST)
+            continue
+        here = there
+        damping = max(0.5 * damping, o.damping)
+        if largest_step(m, w, step) < (1e-3 if o.cold else SMALL):
+            return n + 1, damping
+    return most, damping
+
+
+@entry
+def track_markers(
+    body,
+    integers,
+    balls,
+    index,
+    values,
+    table,
+    segments,
+    clusters,
+    numbers,
+    options,
+    markers,
+    rest,
+    state,
+    speed,
+    lag,
+    memory,
+    forced,
+    before,
+    expected,
+    old,
+    ahead,
+    tensor,
+    normal,
+    vectors,
+    rows,
+    small,
+    marks,
+    rotations,
+    translations,
+    flags,
+    residual,
+    iterations,
+):
+    """Follow every frame of markers (F, M, 3), NaN where one is not seen.
+
+    Written are the rig's local rotations, the base's position, what became of every marker, its distance from
+    its place on the body [m] and the iterations; ``state``, ``speed`` and ``memory`` go on.
+    """
+    m = unpack_model(body, integers)
+    joints, columns = len(m.parent), len(m.hinges)
+    w = unpack_scratch(vectors, rows, small, marks, joints, columns, integers[6], len(index), len(m.points))
+    o = unpack_options(options)
+    for f in range(len(markers)):
+        goal = markers[f]
+        part, arrived = ALL, False
+        copy_rows(state, before)
+        if o.cold:
+            for i in range(len(table)):
+                flags[f, i] = tp.USED if is_seen(goal, i) else tp.LOST
+        else:
+            predict(m, state, speed, o.dt)
+            compute_world(m, w, state)
+            screen(m, w, table, segments, numbers, memory, flags[f], goal, ahead, speed, o)
+            copy_rows(state, expected)
+            for j in range(joints):
+                part = OTHERS if speed[j, 3] > 0.0 else part
+        iterations[f], speed[joints, 3] = improve(
+            m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old, rest,
+            tensor, normal, max(speed[joints, 3], o.damping), part, speed, o,
+        )  # fmt: skip
+        if part == OTHERS:
+            more, _ = improve(
+                m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old,
+                rest, tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
+            )  # fmt: skip
+            iterations[f] += more
+            arrived = more < MORE
+        copy_rows(state, old)
+        if not o.cold:
+            learn_distances(w, segments, numbers, memory, flags[f], goal, speed, o.dt)
+            update_speed(m, state, before, speed, table, flags[f], o.dt)
+            take_up(m, state, expected, lag, speed, o.dt, arrived)
+            let_go(m, old, lag)
+            if o.limits:
+                hold_limits(m, balls, old)
+            compute_world(m, w, old)
+        locals_of_hinges(m, old)
+        for i in range(len(table)):
+            residual[f, i] = 0.0
+            if flags[f, i] == tp.LOST:
+                continue
+            joint = table[i, tp.JOINT]
+            turned = qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i))
+            place = vec.add(vec.load(w.position, joint), turned)
+            residual[f, i] = vec.norm(vec.sub(vec.load(goal, i), place))
+        for j in range(joints):
+            local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(old, j)), qt.load(m.after, j))
+            qt.store(rotations[f], j, local)
+        vec.store(translations, f, vec.load(old, joints))

@@ -1,0 +1,56 @@
+"""The first frame: where the body stands, and which markers cannot be right."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.rigid import fit_rigid
+from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.tracking.engine import packing as tp
+
+Array = NDArray[np.float64]
+
+STRAY = 0.1  # a marker that is farther than this from its place in a first frame is no one's [m]
+TIMES = 5.0  # unless others are as far: this times their median
+
+
+def place_base(body: Articulation, model: MarkerModel, markers: Array) -> Array:
+    """The neutral state, turned and moved to the pelvis' markers, or to all markers where it has few."""
+    figure = model.figure
+    state = body.rest_state()
+    places = figure.rest_positions[model.joints] + rot.mul_vec(figure.neutral[model.joints], model.offsets)
+    places = places - figure.rest_positions[figure.roles.pelvis]
+    seen = np.isfinite(markers[:, 0])
+    trunk = seen & np.isin(model.joints, [figure.roles.pelvis])
+    near = seen & np.isin(model.joints, [figure.roles.pelvis, *figure.roles.spine, *figure.roles.hip])
+    chosen = next((m for m in (trunk, near, seen) if _spans(places[m])), None)
+    if chosen is None:
+        if seen.any():
+            state[len(body.tree), :3] = (markers[seen] - places[seen]).mean(axis=0)
+        return state
+    turn, shift = fit_rigid(places[chosen], markers[chosen])
+    state[body.base] = turn
+    state[len(body.tree), :3] = shift
+    return state
+
+
+def _spans(points: Array) -> bool:
+    """Whether points are three and not on a line, by 3 cm."""
+    if len(points) < 3:
+        return False
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[1] > 0.03)
+
+
+def refuse_strays(residual: Array, flags: NDArray[np.int64], gate: float) -> NDArray[np.bool_]:
+    """(M,) markers of a first frame that are far from their places while others are near; the worst third."""
+    used = flags == tp.USED
+    if not np.isfinite(gate) or not used.any():
+        return np.zeros(len(flags), bool)
+    limit = max(STRAY, TIMES * float(np.median(residual[used])))
+    bad = used & (residual > limit)
+    worst = np.sort(residual[used])[-max(1, int(used.sum()) // 6)]
+    return np.asarray(bad & (residual >= worst), bool)

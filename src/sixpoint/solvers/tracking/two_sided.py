@@ -1,0 +1,97 @@
+"""Across gaps: from what was followed forwards to what was followed backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sixpoint.body import rotations as rot
+from sixpoint.body.dofs import Hinges
+from sixpoint.body.marker_model import MarkerModel
+from sixpoint.solvers.prioritized.articulation import Articulation
+from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.model import carrier_of
+from sixpoint.solvers.tracking.running import Followed
+
+Array = NDArray[np.float64]
+
+SETTLE = 0.15  # time in which a marker that came back is trusted again [s]
+NEVER = 1.0  # doubt of a marker that was not seen yet [s]
+EVEN = 0.02  # doubt of both ways where nothing is missing [s]
+
+
+def blend(
+    body: Articulation, model: MarkerModel, ahead: Followed, back: Followed, markers: Array, rate: float
+) -> Followed:
+    """Join both ways: each joint leans to the way that saw its markers last.
+
+    Hinges stay hinges within their ranges; a ball between two allowed rotations may be a little outside.
+
+    Doubt grows with the time since a marker was used, and fades when it is back; that of a joint is the mean
+    over the markers it carries.
+    """
+    carries = carried_by(body, model)
+    doubt = doubt_of(ahead.flags, rate) @ carries, doubt_of(back.flags[::-1], rate)[::-1] @ carries
+    share = (doubt[0] + EVEN) / (doubt[0] + doubt[1] + 2 * EVEN)
+    # In the world: there both ways agree about what markers tell, however they bend the back to it.
+    rotations = _local(body, _mix(_world(body, ahead), _world(body, back), share))
+    base = share[:, body.base, None]
+    positions = (1 - base) * ahead.positions + base * back.positions
+    moving, translations = body.place_base(rotations, positions)
+    places = model.place(*body.rig.compute_transforms(rotations, translations, moving))
+    # A marker is refused or exchanged where one way did; what both saw is used.
+    flags = np.where(ahead.flags == back.flags, ahead.flags, np.maximum(ahead.flags, back.flags))
+    residual = np.linalg.norm(markers - places, axis=-1)
+    residual = np.where(np.isfinite(residual), residual, 0.0)
+    swapped = flags == tp.SWAPPED
+    residual[swapped] = np.maximum(ahead.residual, back.residual)[swapped]
+    return Followed(rotations, positions, flags, residual, np.maximum(ahead.iterations, back.iterations))
+
+
+def carried_by(body: Articulation, model: MarkerModel) -> Array:
+    """(M, J) share of each marker in what is known of each joint: those on or below it count alike."""
+    carries = np.zeros((len(model.joints), len(body.tree)))
+    for i, joint in enumerate(model.joints):
+        carrier, _ = carrier_of(body, int(joint), np.zeros(3))
+        carries[i, body.tree.path(0, carrier)] = 1.0
+    return np.asarray(carries / np.maximum(carries.sum(axis=0), 1.0))
+
+
+def doubt_of(flags: NDArray[np.int64], rate: float) -> Array:
+    """(F, M) time since each marker was used [s]; after it is back what had grown fades."""
+    out = np.zeros(flags.shape)
+    fade = np.exp(-1 / (SETTLE * rate))
+    known = np.where(flags[0] == tp.USED, 0.0, NEVER)
+    for f, row in enumerate(flags):
+        lost = (row == tp.LOST) | (row == tp.REJECTED)
+        known = np.where(lost, known + 1 / rate, known * fade)
+        out[f] = known
+    return out
+
+
+def _world(body: Articulation, way: Followed) -> Array:
+    """Rotations (F, J, 4) of the rig in the world."""
+    moving, translations = body.place_base(way.rotations, way.positions)
+    return body.rig.compute_transforms(way.rotations, translations, moving)[1]
+
+
+def _local(body: Articulation, world: Array) -> Array:
+    """Local rotations of world rotations (F, J, 4); hinges keep what they can express."""
+    local = rot.mul(rot.inv(world[:, np.maximum(body.tree.parents, 0)]), world)
+    local[:, 0] = world[:, 0]
+    for joint, dof in body.dofs.joints.items():
+        if not isinstance(dof, Hinges):
+            continue
+        before, after = body.before[joint], body.neutral[joint]
+        angles = dof.compute_angles(rot.mul(rot.mul(rot.inv(before), local[:, joint]), rot.inv(after)))
+        turned = np.tile(before, (len(local), 1))
+        for axis, angle in zip(dof.axes, np.clip(angles, dof.lower, dof.upper).T, strict=True):
+            turned = rot.mul(turned, rot.from_axis_angle(axis, angle))
+        local[:, joint] = rot.mul(turned, after)
+    return np.asarray(local)
+
+
+def _mix(a: Array, b: Array, share: Array) -> Array:
+    """Normalised mixture of rotations (F, J, 4), the shorter way."""
+    sign = np.where(np.sum(a * b, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return rot.normalised((1 - share[..., None]) * a + share[..., None] * sign * b)

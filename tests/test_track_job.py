@@ -1,0 +1,189 @@
+"""``sixpoint track`` from files to files, with a marker model that was saved."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sixpoint as sp
+from sixpoint.body.markers import Markers
+from sixpoint.cli.app import main
+from sixpoint.errors import SixpointError
+from sixpoint.formats.markers import save_markers
+from sixpoint.jobs.marker_models import save_marker_model
+from sixpoint.jobs.solving import Solving
+from sixpoint.jobs.track.feet import find_stances
+from sixpoint.jobs.track.job import track
+from sixpoint.jobs.track.options import Following, parse_labels
+from sixpoint.jobs.track.replay import replay
+from sixpoint.live.frames import play_frames
+from sixpoint.live.statistics import Statistics
+from sixpoint.study.tracking import LOST, REFUSED, USED, overall, summarise_markers
+from track_bodies import body
+
+FRAMES = 90
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A walk as C3D with a gap and a ghost, and the model of its markers."""
+    folder = tmp_path_factory.mktemp("track")
+    case = body("walk", noise=0.001)
+    markers = case.markers[:FRAMES].copy()
+    markers[20:40, 3] = np.nan
+    markers[50:55, 9] += 0.3
+    recording = Markers(case.model.names, markers, case.motion.rate, name="walk")
+    save_markers(recording, folder / "walk.c3d")
+    save_marker_model(case.model, folder / "model.toml")
+    return folder / "walk.c3d", folder / "model.toml"
+
+
+def following(files: tuple[Path, Path], **options: object) -> Following:
+    return replace(Following(model=files[1]), **options)  # type: ignore[arg-type]
+
+
+def test_a_recording_is_followed_and_written(files, tmp_path):
+    """The BVH that is written has the joints where they were, within millimetres."""
+    done = track(files[0], tmp_path / "walk.bvh", following=following(files))
+    motion, truth = sp.load(tmp_path / "walk.bvh"), body("walk").motion
+    names = [truth.skeleton.names[j] for j in body("walk").posed]
+    ours = motion.positions[:, [motion.skeleton.names.index(name) for name in names]]
+    theirs = truth.positions[:FRAMES, body("walk").posed]
+    assert np.linalg.norm(ours - theirs, axis=-1).mean() < 5e-3
+    assert np.sum(done.tracked.flags == REFUSED) == 5 and np.sum(done.tracked.flags == LOST) == 20
+
+
+def test_the_command_says_what_became_of_the_markers(files, tmp_path, capsys):
+    """Residuals worst first, gaps and ghosts are on the screen and in the report; nothing is overwritten."""
+    words = ["track", str(files[0]), "--model", str(files[1]), "-o", str(tmp_path / "a.bvh")]
+    words += ["--report", str(tmp_path / "report"), "--picture", str(tmp_path / "a.png")]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    name = body("walk").model.names[9]
+    assert re.search(rf"^{name} .* 5 +0$", text, re.M) and "5 (" + name in text and "times real time" in text
+    report = (tmp_path / "report" / "report.md").read_text()
+    assert name in report and (tmp_path / "report" / "pictures" / "residuals.png").stat().st_size > 10_000
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert main(words) == 2 and "exists" in capsys.readouterr().err
+
+
+def test_joint_angles_are_written(files, tmp_path):
+    """A .mot holds the knees' angles of every frame."""
+    track(files[0], tmp_path / "walk.mot", following=following(files))
+    assert "nRows=90" in (tmp_path / "walk.mot").read_text().replace(" ", "")
+
+
+def test_six_points_of_markers(files, tmp_path):
+    """The six points are the joints', within millimetres; any method poses by them."""
+    done = track(files[0], tmp_path / "six.bvh", following=following(files), six=Solving("sik"))
+    assert done.six is not None
+    targets, _, borrowed = done.six
+    case = body("walk")
+    truth = case.model.figure.targets(case.motion).positions[:FRAMES]
+    off = np.linalg.norm(targets.positions - truth, axis=-1)
+    assert np.nanmean(off, axis=0).max() < 0.01 and np.isfinite(off).all()
+    assert borrowed == ()
+
+
+def test_feet_that_stand_are_held(files, tmp_path):
+    """With --lock-feet a standing ankle moves a third as much as without, at most."""
+    free = track(files[0], tmp_path / "a.bvh", following=following(files))
+    held = track(files[0], tmp_path / "b.bvh", following=following(files, lock_feet=True))
+    assert held.stances is not None
+    stances = find_stances(free.model, free.tracked.motion)
+    assert stances.any()
+    drift = []
+    for done in (free, held):
+        ankles = done.tracked.motion.positions[:, done.model.figure.roles.ankle][..., [0, 2]]
+        inner = stances[1:-1] & stances[2:] & stances[:-2]
+        drift.append(np.linalg.norm(np.diff(ankles, axis=0), axis=-1)[1:][inner].mean())
+    assert drift[1] < 0.5 * drift[0]
+
+
+def test_a_choice_of_markers(files, tmp_path):
+    """--markers follows these alone; an unknown one is an error that lists the others."""
+    names = parse_labels("l_asis, r_asis,l_psis,r_psis,l_heel,l_toe,l_ankle")
+    done = track(files[0], tmp_path / "a.bvh", following=following(files, markers=names))
+    assert done.model.names == names and done.tracked.flags.shape == (FRAMES, 7)
+    with pytest.raises(SixpointError, match="no marker KNEE in the model; there are: c7"):
+        track(files[0], tmp_path / "b.bvh", following=following(files, markers=("KNEE",)))
+
+
+def test_what_excludes_each_other_is_said(files, tmp_path):
+    """A model with a static trial, another's markers, and a cutoff of nothing are clear errors."""
+    with pytest.raises(SixpointError, match="leave out --static"):
+        track(files[0], tmp_path / "a.bvh", following=following(files, static=files[0]))
+    with pytest.raises(SixpointError, match="cutoff"):
+        track(files[0], tmp_path / "a.bvh", following=following(files, cutoff=0.0))
+    stranger = Markers(("A", "B", "C"), np.random.default_rng(0).normal(0, 1, (5, 3, 3)), 100.0, name="x")
+    save_markers(stranger, tmp_path / "x.npz")
+    with pytest.raises(SixpointError, match="only 0 of the model's 41 markers"):
+        track(tmp_path / "x.npz", tmp_path / "a.bvh", following=following(files))
+    assert not (tmp_path / "a.bvh").exists()
+
+
+def test_a_recording_without_samples_says_so(files, tmp_path):
+    """Frames with two markers are an error that says what a body needs."""
+    names = body("walk").model.names
+    positions = np.full((4, len(names), 3), np.nan)
+    positions[:, :2] = body("walk").markers[:4, :2]
+    empty = Markers(names, positions, 100.0, name="empty")
+    save_markers(empty, tmp_path / "empty.npz")
+    with pytest.raises(SixpointError, match="no frame has three of the model's markers"):
+        track(tmp_path / "empty.npz", tmp_path / "a.bvh", following=following(files))
+
+
+def test_a_batch_follows_markers(files, tmp_path):
+    """The job of a batch takes the command's options and tells what a summary needs."""
+    from sixpoint.jobs.batch import tracking
+
+    options = {"model": files[1], "frames": "0:30", "no_limits": True}
+    tracking.check(options)
+    told = tracking.run_one(files[0], tmp_path / "a.bvh", options)
+    assert told["frames"] == 30 and told["residual"] < 0.005 and told["markers"] == 41
+    with pytest.raises(SixpointError, match="no such file"):
+        tracking.check({"model": tmp_path / "none.toml"})
+
+
+def test_a_replay_keeps_the_pace(files):
+    """Replayed live, every frame that is not left out is solved, and poses are those of a stream."""
+    with replay(files[0], following=following(files)) as session:
+        last = session.run()
+        assert (
+            last is not None
+            and session.statistics.poses + session.statistics.counts["frames left out"] == FRAMES
+        )
+
+
+def test_a_late_loop_leaves_frames_out():
+    """A solver slower than the frames skips to the newest, and is told the time that passed."""
+    import time
+
+    seen = []
+
+    def slow(frame, previous, dt):
+        time.sleep(0.03)
+        seen.append((int(frame[0, 0]), dt))
+        return 0
+
+    frames = np.tile(np.arange(60.0)[:, None, None], (1, 2, 3))
+    statistics = Statistics()
+    play_frames(frames, 200.0, slow, statistics=statistics)
+    assert len(seen) < 40 and statistics.counts["frames left out"] == 60 - len(seen)
+    for (before, _), (now, dt) in zip(seen, seen[1:], strict=False):
+        assert dt == pytest.approx((now - before) / 200.0)
+
+
+def test_a_summary_counts_used_frames_alone():
+    """RMS and worst come from used samples; markers never used are at the end."""
+    residual = np.array([[0.01, 0.5, 0.0], [0.03, 0.02, 0.0]])
+    flags = np.array([[USED, REFUSED, LOST], [USED, USED, LOST]])
+    rows = summarise_markers(("a", "b", "c"), residual, flags)
+    assert [row.name for row in rows] == ["a", "b", "c"]
+    assert rows[0].rms == pytest.approx(np.sqrt(5e-4)) and rows[1].worst == 0.02 and rows[1].refused == 1
+    assert np.isnan(rows[2].rms) and rows[2].seen == 0.0
+    assert overall(residual, flags) == pytest.approx(np.sqrt((1e-4 + 9e-4 + 4e-4) / 3))
