@@ -1,0 +1,304 @@
+"""An arm whose elbow is in the trunk gets it out: by another swivel angle, or where it misses anyway, straight.
+
+Reference: Unzueta et al. 2008, section 8 and Algorithm 5, line 7. A bent arm turns about the line from shoulder
+to wrist, by K times the depth over the length of the upper arm; that angle is where the search for the least
+that frees the elbow begins, so the wrist stays where it is. A stretched arm turns about v x w by
+arccos(v . w), where v and w are the directions from the shoulder to the deepest point and to the nearest point
+of the outline.
+"""
+
+from math import pi
+from typing import NamedTuple
+
+from sixpoint.kernels import quaternion as qt
+from sixpoint.kernels import vector as vec
+from sixpoint.kernels.jit import helper
+from sixpoint.kernels.swing_twist import clamp
+from sixpoint.solvers.avoidance.clearance import deepest, gap_of_arm
+from sixpoint.solvers.sequential.limb import close_on, fold, turn_about_itself
+from sixpoint.solvers.sequential_plus.limbs import carried_angle, slack
+from sixpoint.solvers.six_points.packing import limb_row
+from sixpoint.solvers.tgb.swivel import direction, root_at, triangle
+
+K = 1.0  # of a bent arm's turn
+MET = 1e-3  # m, an arm that misses by less is on its target
+STRETCHES = 4  # turns of a stretched arm
+GROWTH = 1.7  # of the steps in which a free swivel angle is looked for
+LEAST_STEP = pi / 180  # rad
+REFINEMENTS = 5
+AROUND = 24  # samples of the whole circle
+GIVES = 0.02  # m, an arm that misses by so much gives way wholly
+TOUCH = 5e-4  # m, by which an elbow that is let out stays clear
+
+
+class Arm(NamedTuple):
+    """What an arm of one frame is turned on.
+
+    Attributes:
+        shoulder: Its place in the world [m].
+        frame: World rotation of what carries it.
+        target: Where the wrist should be, from the shoulder, in that frame [m].
+        l1: Upper length [m].
+        l2: Lower length [m].
+        ball: Row of the shoulder in the limits.
+        low: Least flexion [rad].
+        high: Largest flexion [rad].
+        limits: Whether limits hold.
+    """
+
+    shoulder: tuple
+    frame: tuple
+    target: tuple
+    l1: float
+    l2: float
+    ball: int
+    low: float
+    high: float
+    limits: bool
+
+
+@helper
+def make_arm(model, limb, shoulder, frame, target, limits):
+    """The arm 0 or 1 of a figure, carried by ``frame`` at ``shoulder``."""
+    row = limb_row(model.segments.shape[0], limb)
+    return Arm(
+        shoulder,
+        frame,
+        target,
+        model.limbs[limb, 0],
+        model.limbs[limb, 1],
+        row,
+        model.limbs[limb, 2],
+        model.limbs[limb, 3],
+        limits,
+    )
+
+
+class Circle(NamedTuple):
+    """The circle of elbows that reach the target; angle 0 is the elbow it was made for.
+
+    Attributes:
+        n: Direction of the target, in the arm's frame.
+        u: Direction of the elbow at angle 0, across n.
+        cosine: Cosine of the angle between upper arm and n.
+        sine: Its sine.
+        middle: Centre of the circle in the world [m].
+        across: Radius at angle 0, in the world [m].
+        beside: Radius at a quarter turn, in the world [m].
+        wrist: In the world [m].
+    """
+
+    n: tuple
+    u: tuple
+    cosine: float
+    sine: float
+    middle: tuple
+    across: tuple
+    beside: tuple
+    wrist: tuple
+
+
+@helper
+def make_circle(arm, elbow):
+    """The circle of an elbow, given from the shoulder in the arm's frame."""
+    n, distance = direction(arm.target)
+    d, cosine, sine, _ = triangle(distance, arm.l1, arm.l2)
+    u = vec.unit(vec.reject(elbow, n))
+    r = arm.l1 * sine
+    return Circle(
+        n,
+        u,
+        cosine,
+        sine,
+        vec.madd(arm.shoulder, arm.l1 * cosine, qt.mul_vec(arm.frame, n)),
+        vec.scale(r, qt.mul_vec(arm.frame, u)),
+        vec.scale(r, qt.mul_vec(arm.frame, vec.cross(n, u))),
+        vec.madd(arm.shoulder, d, qt.mul_vec(arm.frame, n)),
+    )
+
+
+@helper
+def elbow_on(circle, phi):
+    """The elbow in the world at a swivel angle."""
+    q = qt.from_axis_angle((0.0, 0.0, 1.0), phi)
+    s, c = 2.0 * q[2] * q[3], 1.0 - 2.0 * q[2] * q[2]
+    return vec.madd(vec.madd(circle.middle, c, circle.across), s, circle.beside)
+
+
+@helper
+def room_at(arm, circle, flesh, root, world, segs, balls, phi):
+    """How far a swivel angle is allowed by trunk and limits; negative where not [rad]."""
+    elbow = elbow_on(circle, phi)
+    gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow, circle.wrist)
+    free = (gap - TOUCH) / arm.l1
+    if arm.limits and free >= 0.0:
+        free = min(
+            free, slack(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball)
+        )
+    return free
+
+
+@helper
+def within(arm, circle, balls, phi):
+    """Whether limits allow a swivel angle."""
+    if not arm.limits:
+        return True
+    return slack(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball) >= 0.0
+
+
+@helper
+def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
+    """The allowed angle nearest to ``outside`` between one that is allowed and one that is not (Illinois)."""
+    a, b = inside, outside
+    fa = room_at(arm, circle, flesh, root, world, segs, balls, a)
+    fb = room_at(arm, circle, flesh, root, world, segs, balls, b)
+    for _ in range(REFINEMENTS):
+        if fa - fb < 1e-9 or fa < 1e-4:
+            break
+        c = (a * fb - b * fa) / (fb - fa)
+        f = room_at(arm, circle, flesh, root, world, segs, balls, c)
+        if f >= 0.0:
+            a, fa, fb = c, f, 0.5 * fb
+        else:
+            b, fb, fa = c, f, 0.5 * fa
+    return a
+
+
+@helper
+def free_beside(arm, circle, flesh, root, world, segs, balls, about, first, step, most):
+    """The allowed swivel angle nearest to ``about``, at most ``most`` away; and whether there is one.
+
+    Steps to both sides grow; the sign of ``first`` says which side is looked at first.
+    """
+    last, offset = 0.0, min(step, most)
+    while True:
+        for i in range(2):
+            sign = first if i == 0 else -first
+            phi = about + sign * offset
+            if room_at(arm, circle, flesh, root, world, segs, balls, phi) >= 0.0:
+                before = about + sign * last
+                return refine(arm, circle, flesh, root, world, segs, balls, phi, before), True
+        if offset >= most:
+            return about, False
+        last, offset = offset, min(GROWTH * offset, offset + 0.2, most)
+
+
+@helper
+def least_deep(arm, circle, flesh, root, world, segs, balls, about):
+    """The swivel angle within the limits at which the arm is least deep in the trunk; ``about`` if none is."""
+    best = about
+    most = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow_on(circle, about), circle.wrist)
+    for k in range(1, AROUND):
+        for i in range(2):
+            phi = about + (2 * i - 1) * k * pi / AROUND
+            gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow_on(circle, phi), circle.wrist)
+            if gap > most + 1e-4 and within(arm, circle, balls, phi):
+                best, most = phi, gap
+    return best
+
+
+@helper
+def close_arm(arm, balls, upper):
+    """An upper arm set within the limits and turned about itself; the elbow flexes towards the target."""
+    if arm.limits:
+        upper, _ = clamp(balls, arm.ball, upper)
+        return close_on(upper, arm.target, arm.l1, arm.l2, -1.0, balls, arm.ball, arm.low, arm.high)
+    y = qt.y_axis(upper)
+    reach = vec.madd(arm.target, arm.l1, y)
+    v = vec.reject(reach, y)
+    if vec.norm(v) > 1e-6 * arm.l2:
+        upper = turn_about_itself(upper, y, v, -1.0)
+    return fold(upper, reach, arm.l1, arm.l2, -1.0, 0.0, pi)
+
+
+@helper
+def turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, share):
+    """An arm that misses its target turns out of the trunk, a share of the way; then closes on the target."""
+    turned = upper
+    elbow = vec.scale(-arm.l1, qt.y_axis(upper))
+    wrist = vec.madd(arm.shoulder, 1.0, qt.mul_vec(arm.frame, end))
+    before = gap_of_arm(
+        flesh, root, world, segs, arm.shoulder, vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow)), wrist
+    )
+    for _ in range(STRETCHES):
+        here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(turned))))
+        depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+        if depth <= 0.0:
+            break
+        v = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_e, arm.shoulder)))
+        w = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_t, arm.shoulder)))
+        turn = qt.arc(v, w, qt.x_axis(turned))
+        turned = qt.normalised(qt.mul(turn, turned))
+        wrist = vec.add(here, qt.mul_vec(arm.frame, qt.mul_vec(qt.mul(turned, hinge), (0.0, -arm.l2, 0.0))))
+    turned = qt.normalised(qt.mul(upper, qt.scaled(qt.inv_mul(upper, turned), share)))
+    root_turn, bent, there = close_arm(arm, balls, turned)
+    here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(root_turn))))
+    wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, there))
+    if gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist) > before + 1e-4:
+        return root_turn, bent, there
+    return upper, hinge, end
+
+
+@helper
+def clear_arm(arm, flesh, root, world, segs, balls, upper, hinge, end):
+    """Sequential IK: an arm as posed, or with its elbow out of the trunk, whatever the frame before.
+
+    Returns the local rotations of shoulder and elbow, and the wrist in the arm's frame.
+    """
+    elbow = vec.scale(-arm.l1, qt.y_axis(upper))
+    here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow))
+    wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
+    if gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist) >= 0.0:
+        return upper, hinge, end
+    if vec.norm(vec.sub(end, arm.target)) > MET:
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, 1.0)
+    circle = make_circle(arm, elbow)
+    if vec.norm(circle.u) < 0.5:
+        return upper, hinge, end
+    depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+    outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
+    step = max(K * depth / arm.l1, LEAST_STEP)
+    phi, free = free_beside(arm, circle, flesh, root, world, segs, balls, 0.0, outward, step, pi)
+    if not free:
+        phi = least_deep(arm, circle, flesh, root, world, segs, balls, 0.0)
+    return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
+
+
+@helper
+def clear_arm_steadily(arm, flesh, root, world, segs, balls, upper, hinge, end, began, was, bent, most):
+    """SIK+: an arm as posed, or with the swivel angle nearest to that of the last frame which is allowed.
+
+    ``was`` and ``bent`` are the rotations of the last frame, if it ``began`` before; the angle moves by
+    ``most`` [rad] per frame, but for what it moves to be where ``upper`` has it. An elbow that cannot be out
+    in this frame is on its way.
+    """
+    elbow = vec.scale(-arm.l1, qt.y_axis(upper))
+    here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow))
+    wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
+    if gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist) >= 0.0:
+        return upper, hinge, end
+    missed = vec.norm(vec.sub(end, arm.target))
+    if missed > MET:
+        share = min((missed - MET) / GIVES, 1.0)
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, share)
+    circle = make_circle(arm, elbow)
+    if vec.norm(circle.u) < 0.5:
+        return upper, hinge, end
+    before, far = 0.0, pi
+    if began:
+        before = carried_angle(circle.n, circle.u, -1.0, was, bent, arm.l1, arm.l2)
+        far = most
+        if room_at(arm, circle, flesh, root, world, segs, balls, before) >= 0.0:
+            phi = refine(arm, circle, flesh, root, world, segs, balls, before, 0.0)
+            return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
+    depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+    outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
+    phi, free = free_beside(
+        arm, circle, flesh, root, world, segs, balls, before, outward, LEAST_STEP, pi
+    )
+    if not free:
+        phi = least_deep(arm, circle, flesh, root, world, segs, balls, before)
+    phi = before + min(max(phi - before, -far), far)
+    if not within(arm, circle, balls, phi):
+        return upper, hinge, end
+    return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
