@@ -7,7 +7,8 @@ vertex v carried by joints j with weights w moves to ``sum_j w_j (p_j + R_j inv(
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ class Shape:
         bind_positions: (J, 3) places of all joints in the bind pose [m].
         bind_rotations: (J, 4) their world rotations there.
         name: For messages and files.
+        parts: Name -> range of triangles, where the surface is made of named pieces; may be empty.
     """
 
     vertices: Array
@@ -41,6 +43,7 @@ class Shape:
     bind_positions: Array
     bind_rotations: Array
     name: str = "body"
+    parts: Mapping[str, slice] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Shape({self.name!r}, {len(self.vertices)} vertices, {len(self.triangles)} triangles)"
@@ -79,6 +82,12 @@ class Shape:
             raise FigureError("vertices, weights and the bind pose must be finite")
         if np.any(self.weights < 0) or not np.allclose(self.weights.sum(axis=1), 1.0, atol=1e-3):
             raise FigureError("the weights of each vertex must not be negative and must sum to one")
+        set_(self, "parts", dict(self.parts))
+        for name, part in self.parts.items():
+            if part.step not in (None, 1) or not 0 <= part.start <= part.stop <= len(self.triangles):
+                raise FigureError(
+                    f"part {name!r} is a range of the {len(self.triangles)} triangles, got {part}"
+                )
 
     def place(self, positions: Array, world: Array) -> Array:
         """Vertices (..., V, 3) [m] of joints in the world: places (..., J, 3) [m], rotations (..., J, 4)."""
