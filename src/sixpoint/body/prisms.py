@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
 from sixpoint.body.flesh_regions import arm_radius, bare_trunk, trunk_points
-from sixpoint.body.skeleton import frozen
 
 Array = NDArray[np.float64]
 
@@ -161,7 +160,7 @@ def _prism(joint: int, points: Array, high: float, low: float, radius: float) ->
     thin = 0.015
     radii = np.maximum(_reach(near, centre, heights, thin) - thin, LEAST)
     grown = np.maximum(_reach(near, centre, heights, radius), LEAST)
-    return Prism(joint, frozen(centre), frozen(heights), frozen(radii), frozen(grown))
+    return Prism(joint, centre, heights, radii, grown)
 
 
 def _reach(points: Array, centre: Array, heights: Array, radius: float) -> Array:

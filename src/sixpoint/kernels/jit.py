@@ -47,7 +47,7 @@ def algebra(function: F) -> F:
 
 
 def specialised(function: F) -> F:
-    """A helper in which ``if a is None`` is decided by the compiler, so that what None leaves out costs nothing.
+    """A helper in which the compiler decides ``if a is None``: what that leaves out costs nothing.
 
     The condition must stand alone: with ``and`` beside it, it is not seen.
     """

@@ -1,10 +1,11 @@
-"""An arm whose elbow is in the trunk gets it out: by another swivel angle, or where it misses anyway, straight.
+"""An arm whose elbow is in the trunk gets it out: swivelled, or straight where it misses.
 
-Reference: Unzueta et al. 2008, section 8 and Algorithm 5, line 7. A bent arm turns about the line from shoulder
-to wrist, by K times the depth over the length of the upper arm; that angle is where the search for the least
-that frees the elbow begins, so the wrist stays where it is. A stretched arm turns about v x w by
-arccos(v . w), where v and w are the directions from the shoulder to the deepest point and to the nearest point
-of the outline.
+A bent arm turns about the line from shoulder to wrist, by K times the depth over the length of the upper arm;
+that is where the search for the least angle that frees the elbow begins, so the wrist stays where it is. A
+stretched arm turns about v x w by arccos(v . w), where v and w are the directions from the shoulder to the
+deepest point and to the nearest point of the outline.
+
+Reference: Unzueta et al. 2008, section 8 and Algorithm 5, line 7.
 """
 
 from math import pi
@@ -14,19 +15,21 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import clamp
-from sixpoint.solvers.avoidance.clearance import deepest, gap_of_arm
+from sixpoint.solvers.avoidance.clearance import OUTSIDE, deepest, gap_of_arm
 from sixpoint.solvers.sequential.limb import close_on, fold, turn_about_itself
-from sixpoint.solvers.sequential_plus.limbs import carried_angle, slack
+from sixpoint.solvers.sequential_plus.limbs import carried_angle, is_free, slack
 from sixpoint.solvers.six_points.packing import limb_row
 from sixpoint.solvers.tgb.swivel import direction, root_at, triangle
 
 K = 1.0  # of a bent arm's turn
 MET = 1e-3  # m, an arm that misses by less is on its target
-STRETCHES = 4  # turns of a stretched arm
+STRETCHES = 3  # turns of a stretched arm
 GROWTH = 1.7  # of the steps in which a free swivel angle is looked for
-LEAST_STEP = pi / 180  # rad
-REFINEMENTS = 5
-AROUND = 24  # samples of the whole circle
+LEAST_STEP, LARGEST_STEP = pi / 90, pi / 15  # rad
+REFINEMENTS = 4
+ENOUGH = 2e-3  # rad, an angle that is free by less is at the edge
+HALVES = 5  # times that a turn is halved where limits forbid it
+STRAIGHT = 0.01  # sine between upper arm and target below which a swivel angle moves nothing
 GIVES = 0.02  # m, an arm that misses by so much gives way wholly
 TOUCH = 5e-4  # m, by which an elbow that is let out stays clear
 
@@ -126,15 +129,17 @@ def elbow_on(circle, phi):
 
 
 @helper
-def room_at(arm, circle, flesh, root, world, segs, balls, phi):
-    """How far a swivel angle is allowed by trunk and limits; negative where not [rad]."""
-    elbow = elbow_on(circle, phi)
-    gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow, circle.wrist)
-    free = (gap - TOUCH) / arm.l1
-    if arm.limits and free >= 0.0:
-        free = min(
-            free, slack(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball)
-        )
+def gap_at(arm, circle, flesh, root, world, segs, phi):
+    """Distance of the arm from the trunk at a swivel angle [m]."""
+    return gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow_on(circle, phi), circle.wrist)
+
+
+@helper
+def room_at(arm, circle, flesh, root, world, segs, balls, limits, phi):
+    """How far a swivel angle is allowed by the trunk, and by ``limits``; negative where not [rad]."""
+    free = (gap_at(arm, circle, flesh, root, world, segs, phi) - TOUCH) / arm.l1
+    if limits and free >= 0.0:
+        free = min(free, slack(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball))
     return free
 
 
@@ -143,20 +148,21 @@ def within(arm, circle, balls, phi):
     """Whether limits allow a swivel angle."""
     if not arm.limits:
         return True
-    return slack(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball) >= 0.0
+    return is_free(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi, balls, arm.ball)
 
 
 @helper
 def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
     """The allowed angle nearest to ``outside`` between one that is allowed and one that is not (Illinois)."""
     a, b = inside, outside
-    fa = room_at(arm, circle, flesh, root, world, segs, balls, a)
-    fb = room_at(arm, circle, flesh, root, world, segs, balls, b)
+    limits = not within(arm, circle, balls, outside)  # else they allow all between
+    fa = room_at(arm, circle, flesh, root, world, segs, balls, limits, a)
+    fb = room_at(arm, circle, flesh, root, world, segs, balls, limits, b)
     for _ in range(REFINEMENTS):
-        if fa - fb < 1e-9 or fa < 1e-4:
+        if fa < ENOUGH or fa - fb < 1e-9 or abs(a - b) < ENOUGH:
             break
         c = (a * fb - b * fa) / (fb - fa)
-        f = room_at(arm, circle, flesh, root, world, segs, balls, c)
+        f = room_at(arm, circle, flesh, root, world, segs, balls, limits, c)
         if f >= 0.0:
             a, fa, fb = c, f, 0.5 * fb
         else:
@@ -165,36 +171,28 @@ def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
 
 
 @helper
-def free_beside(arm, circle, flesh, root, world, segs, balls, about, first, step, most):
-    """The allowed swivel angle nearest to ``about``, at most ``most`` away; and whether there is one.
+def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, step):
+    """The allowed swivel angle nearest to ``about``, looked for in growing steps to both sides.
 
-    Steps to both sides grow; the sign of ``first`` says which side is looked at first.
+    ``most`` is the arm's distance from the trunk at ``about`` [m], if limits allow that. The side of the sign ``first`` is looked at first. Where there is none, the one within the limits at which
+    the arm is least deep in the trunk; ``about`` where limits allow none.
     """
-    last, offset = 0.0, min(step, most)
+    best, most = about, most + TOUCH
+    last, offset = 0.0, min(step, pi)
     while True:
         for i in range(2):
             sign = first if i == 0 else -first
             phi = about + sign * offset
-            if room_at(arm, circle, flesh, root, world, segs, balls, phi) >= 0.0:
-                before = about + sign * last
-                return refine(arm, circle, flesh, root, world, segs, balls, phi, before), True
-        if offset >= most:
-            return about, False
-        last, offset = offset, min(GROWTH * offset, offset + 0.2, most)
-
-
-@helper
-def least_deep(arm, circle, flesh, root, world, segs, balls, about):
-    """The swivel angle within the limits at which the arm is least deep in the trunk; ``about`` if none is."""
-    best = about
-    most = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow_on(circle, about), circle.wrist)
-    for k in range(1, AROUND):
-        for i in range(2):
-            phi = about + (2 * i - 1) * k * pi / AROUND
-            gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, elbow_on(circle, phi), circle.wrist)
-            if gap > most + 1e-4 and within(arm, circle, balls, phi):
-                best, most = phi, gap
-    return best
+            if within(arm, circle, balls, phi):
+                gap = gap_at(arm, circle, flesh, root, world, segs, phi)
+                if gap >= TOUCH:
+                    before = about + sign * last
+                    return refine(arm, circle, flesh, root, world, segs, balls, phi, before)
+                if gap > most:
+                    best, most = phi, gap
+        if offset >= pi:
+            return best
+        last, offset = offset, min(GROWTH * offset, offset + LARGEST_STEP, pi)
 
 
 @helper
@@ -212,18 +210,17 @@ def close_arm(arm, balls, upper):
 
 
 @helper
-def turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, share):
-    """An arm that misses its target turns out of the trunk, a share of the way; then closes on the target."""
+def turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, before, share):
+    """An arm that misses its target turns out of the trunk, a share of the way; then closes on the target.
+
+    ``before`` is its distance from the trunk as it is [m].
+    """
     turned = upper
-    elbow = vec.scale(-arm.l1, qt.y_axis(upper))
-    wrist = vec.madd(arm.shoulder, 1.0, qt.mul_vec(arm.frame, end))
-    before = gap_of_arm(
-        flesh, root, world, segs, arm.shoulder, vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow)), wrist
-    )
+    wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
     for _ in range(STRETCHES):
         here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(turned))))
         depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
-        if depth <= 0.0:
+        if depth <= TOUCH:
             break
         v = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_e, arm.shoulder)))
         w = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_t, arm.shoulder)))
@@ -248,19 +245,18 @@ def clear_arm(arm, flesh, root, world, segs, balls, upper, hinge, end):
     elbow = vec.scale(-arm.l1, qt.y_axis(upper))
     here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow))
     wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
-    if gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist) >= 0.0:
+    gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist)
+    if gap >= 0.0:
         return upper, hinge, end
     if vec.norm(vec.sub(end, arm.target)) > MET:
-        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, 1.0)
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, 1.0)
     circle = make_circle(arm, elbow)
-    if vec.norm(circle.u) < 0.5:
+    if circle.sine < STRAIGHT:
         return upper, hinge, end
     depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
     outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
     step = max(K * depth / arm.l1, LEAST_STEP)
-    phi, free = free_beside(arm, circle, flesh, root, world, segs, balls, 0.0, outward, step, pi)
-    if not free:
-        phi = least_deep(arm, circle, flesh, root, world, segs, balls, 0.0)
+    phi = find_free(arm, circle, flesh, root, world, segs, balls, 0.0, gap, outward, step)
     return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
 
 
@@ -275,30 +271,33 @@ def clear_arm_steadily(arm, flesh, root, world, segs, balls, upper, hinge, end, 
     elbow = vec.scale(-arm.l1, qt.y_axis(upper))
     here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, elbow))
     wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
-    if gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist) >= 0.0:
+    gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist)
+    if gap >= 0.0:
         return upper, hinge, end
     missed = vec.norm(vec.sub(end, arm.target))
     if missed > MET:
         share = min((missed - MET) / GIVES, 1.0)
-        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, share)
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, share)
     circle = make_circle(arm, elbow)
-    if vec.norm(circle.u) < 0.5:
+    if circle.sine < STRAIGHT:
         return upper, hinge, end
-    before, far = 0.0, pi
+    before, far, at_before = 0.0, pi, gap
     if began:
         before = carried_angle(circle.n, circle.u, -1.0, was, bent, arm.l1, arm.l2)
         far = most
-        if room_at(arm, circle, flesh, root, world, segs, balls, before) >= 0.0:
+        at_before = gap_at(arm, circle, flesh, root, world, segs, before)
+        if not within(arm, circle, balls, before):
+            at_before = -OUTSIDE
+        if at_before >= TOUCH:
             phi = refine(arm, circle, flesh, root, world, segs, balls, before, 0.0)
             return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
-    depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+    _, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
     outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
-    phi, free = free_beside(
-        arm, circle, flesh, root, world, segs, balls, before, outward, LEAST_STEP, pi
-    )
-    if not free:
-        phi = least_deep(arm, circle, flesh, root, world, segs, balls, before)
-    phi = before + min(max(phi - before, -far), far)
-    if not within(arm, circle, balls, phi):
-        return upper, hinge, end
-    return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
+    phi = find_free(arm, circle, flesh, root, world, segs, balls, before, at_before, outward, LEAST_STEP)
+    turn = min(max(phi - before, -far), far)
+    for _ in range(HALVES):
+        if within(arm, circle, balls, before + turn):
+            phi = before + turn
+            return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
+        turn *= 0.5
+    return upper, hinge, end

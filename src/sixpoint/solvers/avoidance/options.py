@@ -36,4 +36,7 @@ def find_flesh(figure: Figure, chain: SpineChain, avoid: tuple[str, ...]) -> Arr
     if not avoid:
         return None
     forearms = "forearms" in avoid
-    return np.ascontiguousarray(pack_flesh(build_prisms(figure, chain, head=forearms), forearms))
+    shoulder, elbow, wrist = figure.roles.limbs[0]
+    ends = ((shoulder, elbow), (elbow, wrist))
+    lengths = [float(np.linalg.norm(figure.offset_between(a, b))) for a, b in ends]
+    return np.ascontiguousarray(pack_flesh(build_prisms(figure, chain, head=forearms), lengths, forearms))

@@ -148,7 +148,7 @@ def pole_of_start(given, limb, n, frame):
 
 @specialised
 def pose_limb(
-    model, s, limb, target, frame, place, pole, turned, began, root, world, segs, flesh, local, residual
+    model, s, limb, target, frame, place, pole, turned, began, flesh, root, scratch, local, residual
 ):
     """A limb whose middle joint points to ``pole``, and its extremity.
 
@@ -182,7 +182,19 @@ def pose_limb(
             arm = make_arm(model, limb, place, frame, aim, s.limits)
             most = s.swivel_speed * s.dt
             upper, hinge, end = clear_arm_steadily(
-                arm, flesh, root, world, segs, model.balls, upper, hinge, end, began, was, bent, most
+                arm,
+                flesh,
+                root,
+                scratch.world,
+                scratch.segs,
+                model.balls,
+                upper,
+                hinge,
+                end,
+                began,
+                was,
+                bent,
+                most,
             )
     end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     if turned.shape[0] > 0:
@@ -207,7 +219,20 @@ def solve_frame(model, s, points, turned, flesh, local, memory, residual, scratc
         n = vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place)))
         pole = point_limb(s, limb, n, frame, turned)
         pose_limb(
-            model, s, limb, target, frame, place, pole, turned, began, root, world, segs, flesh, local, residual
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
         )
     return judge(lost, residual)
 
@@ -230,7 +255,20 @@ def solve_frame_from(model, s, points, turned, given, flesh, local, memory, resi
         frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         pole = pole_of_start(given, limb, vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place))), frame)
         pose_limb(
-            model, s, limb, target, frame, place, pole, turned, began, root, world, segs, flesh, local, residual
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
         )
     return judge(lost, residual)
 
@@ -261,9 +299,7 @@ def solve_plus(
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(
-            model, s, points[f], turned[f], None, local, memory, residual[f], scratch
-        )
+        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], None, local, memory, residual[f], scratch)
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])
 

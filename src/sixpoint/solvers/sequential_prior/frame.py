@@ -201,7 +201,20 @@ def solve_frame(
         wish = wish_pole(model, limb, gap, base, places, turns, turned, thought.features)
         pole = vec.add(vec.scale(1.0 - trust, plain), vec.scale(trust, qt.inv_mul_vec(frame, wish)))
         pose_limb(
-            model, s, limb, target, frame, place, pole, turned, began, root, world, segs, flesh, local, residual
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
         )
     return judge(lost, residual)
 
