@@ -4,7 +4,7 @@ Nothing of the solver's own description of the trunk is used here: a vertex near
 a ray from it crosses the trunk's closed mesh an odd number of times, and as deep as the nearest point of it
 is far.
 
-    python benchmarks/collision.py [--write docs/collision.md] [--frames 200] [--data FOLDER]
+    python benchmarks/collision.py [--write docs/collision.md] [--frames 1000] [--data FOLDER]
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ import numpy as np
 import trimesh
 from marked import rewrite
 from numpy.typing import NDArray
+from reaches import is_within, reach_across, wander_around
+from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from sixpoint.body.flesh import build_shape
@@ -30,7 +32,6 @@ METHODS = ("sik", "sik+", "sik-prior")
 NEAR = 0.07  # m, of an elbow joint: vertices of the arm that count as its elbow
 DEEP = 0.005  # m, a penetration that counts
 SEEDS = (1, 2, 3, 4, 5, 6)
-RATE = 60.0
 
 
 class Meter:
@@ -50,72 +51,60 @@ class Meter:
             off = np.linalg.norm(vertices[arm] - positions[joint], axis=1)
             self.elbows.append(arm[off < near])
 
-    def measure(self, motion: sp.Motion) -> Array:
-        """Depth (F, 2) of the left and the right elbow [m], 0 outside."""
+    def measure(self, motion: sp.Motion, known: tuple[sp.Motion, Array] | None = None) -> Array:
+        """Depth (F, 2) of the left and the right elbow [m], 0 outside.
+
+        Frames posed as in a ``known`` motion are as deep as there.
+        """
         positions, world = motion.transforms
-        out = np.zeros((len(positions), 2))
-        for f in range(len(positions)):
+        out, frames = np.zeros((len(positions), 2)), np.arange(len(positions))
+        if known is not None:
+            out[:] = known[1]
+            frames = np.flatnonzero((motion.rotations != known[0].rotations).any(axis=(1, 2)))
+            out[frames] = 0.0
+        for f in frames:
             vertices = self.shape.place(positions[f], world[f])
             mesh = trimesh.Trimesh(vertices[self.trunk], self.faces, process=False)
-            low, high = mesh.bounds
             for side, elbow in enumerate(self.elbows):
-                points = vertices[elbow]
-                points = points[((points > low) & (points < high)).all(axis=1)]
-                if len(points):
-                    inside = points[mesh.contains(points)]
-                    if len(inside):
-                        out[f, side] = trimesh.proximity.closest_point(mesh, inside)[1].max()
+                out[f, side] = depth_in(mesh, vertices[elbow])
         return out
 
+    def find_way_out(self, motion: sp.Motion, frame: int, side: int) -> float:
+        """The least depth of an elbow [m] over all swivel angles within the shoulder's limits, by 5 degrees.
 
-def smooth(t: Array) -> Array:
-    """From 0 to 1 with rest at both ends."""
-    return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
+        The wrist stays where it is: the arm turns about the line to it.
+        """
+        figure, joint = self.figure, self.figure.roles.shoulder[side]
+        positions, world = (array[frame] for array in motion.transforms)
+        parent = int(figure.skeleton.parents[joint])
+        above = Rotation.from_quat(world[parent]) * Rotation.from_quat(figure.neutral[parent]).inv()
+        line = positions[figure.roles.wrist[side]] - positions[joint]
+        line /= np.linalg.norm(line)
+        below = figure.skeleton.subtree(joint)
+        vertices = self.shape.place(positions, world)
+        trunk = trimesh.Trimesh(vertices[self.trunk], self.faces, process=False)
+        least = np.inf
+        for angle in np.radians(np.arange(0, 360, 5)):
+            turn = Rotation.from_rotvec(angle * line)
+            own = turn * Rotation.from_quat(world[joint]) * Rotation.from_quat(figure.neutral[joint]).inv()
+            if not is_within(figure.dofs[joint].limit, above.inv() * own) and angle > 0.0:
+                continue
+            moved, turned = positions.copy(), world.copy()
+            moved[below] = positions[joint] + turn.apply(positions[below] - positions[joint])
+            turned[below] = (turn * Rotation.from_quat(world[below])).as_quat()
+            points = self.shape.place(moved, turned)[self.elbows[side]]
+            least = min(least, depth_in(trunk, points))
+            if least == 0.0:
+                break
+        return least
 
 
-def reach_across(figure: sp.Figure, seed: int, frames: int) -> sp.Targets:
-    """Hands that wander around the trunk, near its surface, from point to point; the trunk sways.
-
-    The trunk is an elliptic cylinder here, as wide and deep as the mesh; wrists stay 4 to 14 cm out of it
-    and within the arms' length of the shoulder of the neutral pose.
-    """
-    rng = np.random.default_rng(seed)
-    rest, roles = figure.rest_positions, figure.roles
-    shoulders, hips = rest[list(roles.shoulder)], rest[list(roles.hip)]
-    arm = np.linalg.norm(figure.offset_between(roles.shoulder[0], roles.elbow[0]))
-    arm += np.linalg.norm(figure.offset_between(roles.elbow[0], roles.wrist[0]))
-    low, high = hips[:, 1].mean() + 0.05, shoulders[:, 1].mean() + 0.02
-    width, depth = 0.8 * abs(shoulders[0, 0]), 0.11
-    middle = 0.5 * (hips.mean(axis=0) + shoulders.mean(axis=0))
-
-    def place(angle: Array, height: Array, gap: Array) -> Array:
-        out = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
-        points = out * np.array([width, 0.0, depth]) + gap[..., None] * out
-        return points + np.array([middle[0], 0.0, middle[2]]) + height[..., None] * np.array([0.0, 1.0, 0.0])
-
-    count = int(np.ceil(frames / 30)) + 1
-    t = np.arange(frames) / 30.0
-    first, share = t.astype(int), smooth(t % 1.0)
-    points = np.zeros((frames, 6, 3))
-    for side in range(2):
-        sign = 1.0 if side == 0 else -1.0
-        knots = np.zeros((count, 3))
-        for k in range(count):
-            while True:  # from across the chest over the own side to the small of the back
-                knots[k] = rng.uniform(-1.4, 2.8), rng.uniform(low, high), rng.uniform(0.04, 0.14)
-                here = place(sign * knots[k, 0], knots[k, 1], knots[k, 2])
-                if np.linalg.norm(here - shoulders[side]) < 0.97 * arm:
-                    break
-        now = knots[first] + share[:, None] * (knots[first + 1] - knots[first])
-        points[:, 2 + side] = place(sign * now[:, 0], now[:, 1], now[:, 2])
-    points[:, 1] = rest[roles.head] + figure.head_offset
-    points[:, 0] = rest[roles.pelvis]
-    lean = 0.15 * np.sin(t[:, None] * rng.uniform(0.5, 1.5, 3) + rng.uniform(0, 6, 3))
-    for f in range(frames):
-        turn = trimesh.transformations.euler_matrix(*lean[f])[:3, :3]
-        points[f, 1:4] = points[f, 1:4] @ turn.T
-    points[:, 4:] = rest[list(roles.ankle)]
-    return sp.Targets(points, RATE, name=f"reaches {seed}")
+def depth_in(mesh: trimesh.Trimesh, points: Array) -> float:
+    """How deep the deepest of points is in a closed mesh [m]; 0 outside."""
+    low, high = mesh.bounds
+    points = points[((points > low) & (points < high)).all(axis=1)]
+    inside = points[mesh.contains(points)] if len(points) else points
+    return float(trimesh.proximity.closest_point(mesh, inside)[1].max()) if len(inside) else 0.0
 
 
 @dataclass(frozen=True)
@@ -127,6 +116,8 @@ class Row:
         frames: How many.
         deep: Frames with an elbow more than 5 mm in the trunk, without and with.
         worst: Largest depth without and with [m].
+        bound: Elbows more than 5 mm deep with avoidance, and those of them that no swivel angle within the
+            limits gets out of the mesh while the wrist stays.
         met: Arms on their targets, to 1 mm, without.
         kept: Share of those that still are.
         cost: Time with over time without.
@@ -138,6 +129,7 @@ class Row:
     frames: int
     deep: tuple[int, int]
     worst: tuple[float, float]
+    bound: tuple[int, int]
     met: int
     kept: float
     cost: float
@@ -162,16 +154,22 @@ def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter
     """One method with and without avoidance."""
     solvers = [sp.make_solver(method, figure, **more) for more in ({}, {"avoid": "elbows"})]
     found = [[solver.solve_frames(part) for part in targets] for solver in solvers]
-    depths = [np.concatenate([meter.measure(s.motion) for s in of]) for of in found]
+    plain_depths = [meter.measure(s.motion) for s in found[0]]
+    known = [(s.motion, depth) for s, depth in zip(found[0], plain_depths, strict=True)]
+    clear_depths = [meter.measure(s.motion, k) for s, k in zip(found[1], known, strict=True)]
+    depths = [np.concatenate(plain_depths), np.concatenate(clear_depths)]
     misses = [np.concatenate([s.residual[:, 2:4] for s in of]) for of in found]
     turned = [np.concatenate([s.motion.rotations for s in of]) for of in found]
     met = misses[0] < 1e-3
+    left = np.argwhere(depths[1] > DEEP)
+    whole = sp.Motion.from_poses([s.motion.pose(f) for s in found[1] for f in range(len(s.motion))], 60.0)
     plain, clear = time_pair(*solvers, targets)
     return Row(
         method,
         len(depths[0]),
         tuple(int((d.max(axis=1) > DEEP).sum()) for d in depths),
         tuple(float(d.max()) for d in depths),
+        (len(left), sum(meter.find_way_out(whole, int(f), int(side)) > DEEP for f, side in left)),
         int(met.sum()),
         float((misses[1][met] < 1e-3).mean()) if met.any() else 1.0,
         clear / plain,
@@ -183,14 +181,15 @@ def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter
 def table(rows: Sequence[Row]) -> str:
     """Rows as Markdown."""
     lines = [
-        "| method | frames | elbow deeper than 5 mm | with avoidance | fewer by | deepest | with avoidance "
-        "| on target without, still within 1 mm | unchanged frames | time |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| method | frames | elbow deeper than 5 mm | with avoidance | fewer by | left, bound by limits "
+        "| deepest | with avoidance | on target without, still within 1 mm | unchanged frames | time |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for r in rows:
         fewer = f"{100 * (1 - r.deep[1] / r.deep[0]):.1f} %" if r.deep[0] else "-"
         lines.append(
-            f"| `{r.method}` | {r.frames} | {r.deep[0]} | {r.deep[1]} | {fewer} | {1e3 * r.worst[0]:.0f} mm "
+            f"| `{r.method}` | {r.frames} | {r.deep[0]} | {r.deep[1]} | {fewer} "
+            f"| {r.bound[0]}, {r.bound[1]} | {1e3 * r.worst[0]:.0f} mm "
             f"| {1e3 * r.worst[1]:.0f} mm | {100 * r.kept:.2f} % of {r.met} | {r.still} "
             f"| {r.micro:.1f} us x {r.cost:.2f} |"
         )
@@ -211,15 +210,19 @@ def main() -> None:
     """Measure, print, and write into a page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", type=Path)
-    parser.add_argument("--frames", type=int, default=200)
+    parser.add_argument("--frames", type=int, default=1000, help="of each reach; wandering has 200")
     parser.add_argument("--data", type=Path, default=DATA)
     options = parser.parse_args()
     plain = sp.Figure.from_stature(1.75)
     figure = plain.with_shape(build_shape(plain))
-    reaches = [reach_across(figure, seed, options.frames) for seed in SEEDS]
-    meter = Meter(figure)
-    parts = {"reaches": table([compare(figure, m, reaches, meter) for m in METHODS])}
-    print(parts["reaches"], flush=True)
+    meter, parts = Meter(figure), {}
+    for part, make, frames in (
+        ("reaches", reach_across, options.frames),
+        ("wandering", wander_around, min(options.frames, 200)),
+    ):
+        targets = [make(figure, seed, frames) for seed in SEEDS]
+        parts[part] = table([compare(figure, m, targets, meter) for m in METHODS])
+        print(f"{part}\n\n{parts[part]}\n", flush=True)
     own, boxing, name = boxing_targets(figure, options.data)
     rows = [compare(own, m, [boxing], Meter(own)) for m in METHODS]
     parts["boxing"] = f"On {name}:\n\n{table(rows)}"

@@ -155,7 +155,7 @@ def within(arm, circle, balls, phi):
 def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
     """The allowed angle nearest to ``outside`` between one that is allowed and one that is not (Illinois)."""
     a, b = inside, outside
-    limits = not within(arm, circle, balls, outside)  # else they allow all between
+    limits = not within(arm, circle, balls, outside)  # else they most likely allow all between
     fa = room_at(arm, circle, flesh, root, world, segs, balls, limits, a)
     fb = room_at(arm, circle, flesh, root, world, segs, balls, limits, b)
     for _ in range(REFINEMENTS):
@@ -167,7 +167,7 @@ def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
             a, fa, fb = c, f, 0.5 * fb
         else:
             b, fb, fa = c, f, 0.5 * fa
-    return a
+    return a if limits or within(arm, circle, balls, a) else inside
 
 
 @helper
