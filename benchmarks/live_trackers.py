@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.calibration.model import stature_of
+from sixpoint.body.stature import stature_of
 from sixpoint.calibration.roles import KITS, POINTS, assign_roles
 from sixpoint.live.feet import Floor, level_feet
 from sixpoint.live.guides import Guidance

@@ -23,6 +23,7 @@ ALLOWED = {
     "study": {"study", "signals", "body", "errors"},
     "studies": set(),
     "viewer": {"viewer", "body", "errors"},
+    "render": {"render", "body", "errors"},
     "jobs": {
         "jobs",
         "live",
@@ -33,6 +34,7 @@ ALLOWED = {
         "datasets",
         "study",
         "viewer",
+        "render",
         "body",
         "errors",
     },
@@ -44,7 +46,7 @@ ALLOWED = {
 LIBRARIES = {
     "kernels": {"numpy", "numba"},
     "body": {"numpy", "scipy"},
-    "formats": {"numpy", "scipy"},
+    "formats": {"numpy", "scipy", "PIL"},
     "samples": {"numpy", "scipy"},
     "signals": {"numpy", "scipy"},
     "calibration": {"numpy", "scipy"},
@@ -52,10 +54,13 @@ LIBRARIES = {
     "solvers": {"numpy"},
     "study": {"numpy", "scipy", "matplotlib", "torch"},
     "viewer": {"numpy", "viser"},
+    "render": {"numpy", "scipy", "embreex", "av", "PIL"},
     "jobs": {"numpy", "viser"},
     "cli": {"numpy", "cyclopts", "rich"},
 }
 """Room -> third-party libraries it may import."""
+
+THIRD_PARTY = {"trimesh"}.union(*LIBRARIES.values())
 
 FILES = sorted(p for p in PACKAGE.rglob("*.py") if p != PACKAGE / "__init__.py")
 
@@ -87,7 +92,7 @@ def test_rooms_import_only_what_lies_below(path):
         if parts[0] == "sixpoint":
             below = parts[1] if len(parts) > 1 else ""
             assert below in ALLOWED[room] or name in ("sixpoint", "sixpoint.__version__"), name
-        elif parts[0] in {"numpy", "scipy", "numba", "matplotlib", "cyclopts", "rich", "torch", "viser"}:
+        elif parts[0] in THIRD_PARTY:
             assert parts[0] in LIBRARIES.get(room, set()), name
 
 

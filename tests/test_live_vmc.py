@@ -22,7 +22,7 @@ from sixpoint.live.osc import Bundle, make_message
 from sixpoint.live.osc_write import encode
 from sixpoint.live.readings import LOST, NO_ROTATION, Reading
 from sixpoint.live.unity import mirror_position, mirror_rotation
-from sixpoint.live.vmc_bones import HUMAN_BONES, find_bones
+from sixpoint.body.human_bones import HUMAN_BONES, find_bones
 from sixpoint.live.vmc_write import PerformerWriter, write_devices
 
 RIGS = [pytest.param(p, id=p.name) for p in real_rigs()] or [

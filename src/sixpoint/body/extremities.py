@@ -32,7 +32,7 @@ def add_head(flesh: Flesh, sizes: dict[str, Any], middle: Array) -> None:
         places,
         sectors=20,
         exponents=exponents,
-        caps=(0.006 * stature, 0.0035 * stature),
+        caps=(0.009 * stature, 0.0035 * stature),
     )
     vertices = egg.vertices.copy()
     aside = np.abs(vertices[:, 0] - middle[0]) / (0.011 * stature)

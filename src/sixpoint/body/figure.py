@@ -194,6 +194,12 @@ class Figure:
         return np.asarray(self.rest_positions[other] - self.rest_positions[joint])
 
     @cached_property
+    def limb_lengths(self) -> Array:
+        """(4,) lengths of left arm, right arm, left leg and right leg, stretched [m]."""
+        bones = [[self.offset_between(a, b), self.offset_between(b, c)] for a, b, c in self.roles.limbs]
+        return np.asarray(np.linalg.norm(bones, axis=2).sum(axis=1))
+
+    @cached_property
     def spine_chain(self) -> SpineChain:
         """The trunk as the solvers see it, coincident joints merged."""
         return SpineChain.from_figure(self)

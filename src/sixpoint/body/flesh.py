@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.extremities import add_foot, add_hand, add_head
 from sixpoint.body.figure import Figure
 from sixpoint.body.flesh_parts import Flesh, frames_along, smooth_step, weigh_along
 from sixpoint.body.loft import loft, sample
 from sixpoint.body.shape import Shape
+from sixpoint.body.stature import stature_of
 from sixpoint.body.tables import read_shipped
 
 Array = NDArray[np.float64]
@@ -35,11 +35,6 @@ def _sizes() -> dict[str, Any]:
     return read_shipped("flesh.toml")
 
 
-@cache
-def _stature_per_height() -> float:
-    return MEAN_STATURE / Figure.from_stature(MEAN_STATURE).height
-
-
 def build_shape(figure: Figure) -> Shape:
     """A closed, skinned mesh around any figure.
 
@@ -47,10 +42,11 @@ def build_shape(figure: Figure) -> Shape:
     watertight: ``trunk``, ``head``, and with ``l_`` and ``r_``: ``arm``, ``hand``, ``leg``, ``foot``. Parts
     overlap where they meet. A vertex hangs on at most four joints.
 
-    Reference: sections after Drillis & Contini 1966 and Gordon et al. 2014 (ANSUR II); ``data/flesh.toml``.
+    Reference: lengths of head, hands and feet after Drillis & Contini 1966; for the sections see
+    ``data/flesh.toml``.
     """
     positions, world = figure.neutral_pose.compute_transforms()
-    flesh = Flesh(figure, positions, figure.height * _stature_per_height())
+    flesh = Flesh(figure, positions, stature_of(figure))
     sizes = _sizes()
     middle = _add_trunk(flesh, sizes["trunk"], sizes["head"])
     add_head(flesh, sizes["head"], middle)
@@ -81,7 +77,9 @@ def _add_limb(
     centres = _along(points, places)
     across, ahead = frames_along(centres, sign)
     ball = float(radii[0].mean())
-    tube = loft(centres, across, ahead, radii, places, sectors=16, caps=(ball, 0.3 * float(radii[-1].mean())))
+    tube = loft(
+        centres, across, ahead, radii, places, sectors=16, caps=(0.9 * ball, 0.3 * float(radii[-1].mean()))
+    )
     upper = float(np.linalg.norm(points[1] - points[0]))
     lower = float(np.linalg.norm(points[2] - points[1]))
     thick = sample(rows, [1.0, 2.0]).mean(axis=1) * flesh.stature

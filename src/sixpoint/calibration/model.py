@@ -7,14 +7,13 @@ lie along the bones, which is where pivots are weakest.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.figure import Figure
+from sixpoint.body.stature import stature_of
 from sixpoint.calibration.pivots import Rest
 from sixpoint.calibration.standing import Posture
 
@@ -77,7 +76,7 @@ class Body:
     @property
     def legs(self) -> Array:
         """(2,) lengths of the stretched legs, hip to ankle [m]."""
-        return np.array([_length(self.figure, limb) for limb in self.figure.roles.limbs[2:]])
+        return self.figure.limb_lengths[2:]
 
     def rests(self, mounts: Array) -> dict[int, Rest]:
         """How still head, wrists and ankles are held, by effector; the neck turns with the head.
@@ -95,19 +94,3 @@ class Body:
         ]
         arm, leg = Rest(0.154 * h, 0.05, 0.02), Rest(0.49 * h, 0.05, 0.006)
         return {1: Rest(0.29 * h, 0.04, 0.01, tuple(links)), 2: arm, 3: arm, 4: leg, 5: leg}
-
-
-def stature_of(figure: Figure) -> float:
-    """The stature of an average person whose legs and trunk are as long as the figure's [m]."""
-    return MEAN_STATURE * figure.height / _mean_height()
-
-
-@cache
-def _mean_height() -> float:
-    return Figure.from_stature(MEAN_STATURE).height
-
-
-def _length(figure: Figure, limb: tuple[int, int, int]) -> float:
-    root, middle, end = limb
-    upper, lower = figure.offset_between(root, middle), figure.offset_between(middle, end)
-    return float(np.linalg.norm(upper) + np.linalg.norm(lower))

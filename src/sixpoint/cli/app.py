@@ -21,6 +21,7 @@ from sixpoint.cli.demo import demo
 from sixpoint.cli.info import info
 from sixpoint.cli.live import live
 from sixpoint.cli.reconstruct import reconstruct
+from sixpoint.cli.render import render
 from sixpoint.cli.screen import Screen, messages
 from sixpoint.cli.study import study
 from sixpoint.cli.view import view
@@ -37,7 +38,7 @@ FAILED, INTERRUPTED = 2, 130
 def make_app() -> App:
     """The program with all its commands."""
     app = App(name="sixpoint", help=HELP, version=sixpoint.__version__, help_format="markdown")
-    for command in (demo, view, reconstruct, compare, convert, info, live, study, data):
+    for command in (demo, view, reconstruct, render, compare, convert, info, live, study, data):
         app.command(command)
     return app
 

@@ -12,8 +12,12 @@ from sixpoint.cli.screen import Screen
 
 
 def convert(
-    source: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .asf) or six points (.csv, .npz).")],
-    out: Annotated[Path, Parameter(help="A motion (.bvh, .amc with its .asf) or six points (.csv, .npz).")],
+    source: Annotated[
+        Path, Parameter(help="A motion (.bvh, .amc, .asf, .glb, .vrm ..) or six points (.csv, .npz).")
+    ],
+    out: Annotated[
+        Path, Parameter(help="A motion (.bvh, .amc with its .asf, .glb, .vrma) or six points (.csv, .npz).")
+    ],
     /,
     *,
     skeleton: Skeleton = None,
@@ -40,6 +44,7 @@ def convert(
     ```
     sixpoint convert 17_10.amc boxing.bvh --out-unit cm
     sixpoint convert boxing.bvh boxing_points.csv
+    sixpoint convert boxing.bvh boxing.vrma
     sixpoint convert boxing_points.csv boxing_points.npz --frames 0:600
     ```
     """

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import EFFECTORS, Targets
+from sixpoint.errors import listed
+from sixpoint.jobs.info import MotionInfo
 from sixpoint.jobs.reading import Opened
 from sixpoint.jobs.solving import Solved
 from sixpoint.solvers.base import Status
@@ -57,6 +59,25 @@ def describe_figure(figure: Figure) -> list[Row]:
         ("spine", f"{plural(len(r.spine), 'joint')}: {' '.join(names[j] for j in r.spine)}"),
         ("height", f"{figure.height:.3f} m (calf + thigh + pelvis + torso + neck)"),
     ]
+
+
+def describe_avatar(found: MotionInfo) -> list[Row]:
+    """What a character is made of; nothing for other files."""
+    avatar = found.avatar
+    if avatar is None:
+        return []
+    shape, humanoid = avatar.figure.shape, avatar.humanoid
+    mesh = "none"
+    if shape is not None:
+        count = plural(len(avatar.pieces), "primitive")
+        mesh = f"{count}, {len(shape.vertices)} vertices, {len(shape.triangles)} triangles"
+    rows = [("kind", avatar.kind), ("mesh", mesh)]
+    if humanoid is not None:
+        rows.append(("humanoid", f"{plural(len(humanoid.bones), 'bone')} mapped"))
+    names = avatar.animations
+    shown = f"{len(names)}: {listed(names, 8)}; the first is read" if names else "none: the pose of the nodes"
+    rows.append(("animations", shown))
+    return rows
 
 
 def describe_errors(errors: Errors) -> list[Row]:

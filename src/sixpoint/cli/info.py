@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 def info(
-    file: Annotated[Path, Parameter(help="A motion (.bvh, .amc, .asf) or six points (.csv, .npz).")],
+    file: Annotated[
+        Path, Parameter(help="A motion (.bvh, .amc, .asf, .glb, .vrm ..) or six points (.csv, .npz).")
+    ],
     /,
     *,
     tree: Annotated[bool, Parameter(negative="", help="Show the tree of joints.")] = False,
@@ -33,7 +35,7 @@ def info(
 
     ```
     sixpoint info 17_10.amc
-    sixpoint info avatar.bvh --tree
+    sixpoint info avatar.vrm --tree
     sixpoint info points.csv
     ```
     """
@@ -66,6 +68,9 @@ def _show_motion(screen: Screen, found: MotionInfo, tree: bool) -> None:
             ("root moves", describe.describe_box(motion.root_positions)),
         ]
     )
+    if found.avatar is not None:
+        screen.say("avatar", style="bold")
+        screen.rows(describe.describe_avatar(found))
     if found.figure is None:
         screen.say("no human figure", style="bold yellow")
         screen.rows([("why", found.problem)])

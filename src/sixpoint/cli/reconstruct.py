@@ -22,7 +22,8 @@ def reconstruct(
         Path | None,
         Parameter(
             name=("--out", "-o"),
-            help="A .bvh, or an .amc with its .asf; by default `<name>_<method>.bvh` in this folder.",
+            help="A .bvh, an .amc with its .asf, a .glb or a .vrma; by default `<name>_<method>.bvh` in this "
+            "folder, of an avatar `<name>_<avatar>.glb`.",
         ),
     ] = None,
     skeleton: Annotated[
@@ -30,8 +31,23 @@ def reconstruct(
         Parameter(help="For an .amc: its .asf. For six points: the rig to pose (.bvh, .asf, .amc)."),
     ] = None,
     stature: Annotated[
-        float | None, Parameter(help="For six points: stature of the built-in figure [m]; 1.75 by default.")
+        float | None,
+        Parameter(
+            help="For six points: stature of the built-in figure [m]; 1.75 by default. With --avatar: of the "
+            "person whose points they are, else estimated from them."
+        ),
     ] = None,
+    avatar: Annotated[
+        Path | None,
+        Parameter(help="Pose this avatar (.glb, .gltf, .vrm) instead, whatever its proportions."),
+    ] = None,
+    avatar_mapping: Annotated[
+        Path | None, Parameter(help="As --mapping, for the bones of the avatar.")
+    ] = None,
+    retarget: Annotated[
+        Literal["relative", "absolute"],
+        Parameter(help="For an avatar: keep the pose, or what hands and feet touch."),
+    ] = "relative",
     frames: Frames = None,
     method: Annotated[
         str,
@@ -57,6 +73,13 @@ def reconstruct(
             "or some of pelvis,head,l_wrist,r_wrist,l_ankle,r_ankle. With sik+ and sik-prior."
         ),
     ] = None,
+    avoid: Annotated[
+        str | None,
+        Parameter(
+            help="Keep `elbows` out of the trunk, or `elbows,forearms`: hands too, and out of the head. With "
+            "sik, sik+ and sik-prior."
+        ),
+    ] = None,
     limits: LimitsFile = None,
     no_limits: NoLimits = False,
     mapping: Mapping = None,
@@ -74,7 +97,8 @@ def reconstruct(
     """Pose a whole body from six points, and write it.
 
     Of a motion the six points are taken, and the result is measured against it. Six points alone are
-    posed on the rig of --skeleton, or on the built-in figure; they are in metres and Y up.
+    posed on the rig of --skeleton, or on the built-in figure; they are in metres and Y up. With --avatar the
+    points of either move an avatar, which is written with its meshes and materials.
 
     For example:
 
@@ -83,14 +107,17 @@ def reconstruct(
     sixpoint reconstruct 90_05.bvh --frames 1: --extras
     sixpoint reconstruct kick.bvh --method sik --weights 1,1,0
     sixpoint reconstruct walk.bvh --rotations pelvis,head
+    sixpoint reconstruct boxing.bvh --avoid elbows
     sixpoint reconstruct points.csv --stature 1.68
     sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
+    sixpoint reconstruct 17_10.amc --avatar robot.glb -o boxing_robot.glb
+    sixpoint reconstruct points.csv --avatar miko.vrm -o miko.vrma
     ```
     """
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
     from sixpoint.jobs.reconstruct import Body
     from sixpoint.jobs.reconstruct import reconstruct as run
-    from sixpoint.jobs.solving import Solving, parse_rotations, parse_weights
+    from sixpoint.jobs.solving import Solving, parse_names, parse_rotations, parse_weights
 
     solving = Solving(
         method,
@@ -99,6 +126,7 @@ def reconstruct(
         limits=not no_limits,
         limits_file=limits,
         rotations=() if rotations is None else parse_rotations(rotations),
+        avoid=() if avoid is None else parse_names(avoid),
     )
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
     screen = Screen()
@@ -108,7 +136,7 @@ def reconstruct(
             out,
             reading=reading,
             solving=solving,
-            body=Body(skeleton, stature, mapping),
+            body=Body(skeleton, stature, mapping, avatar, avatar_mapping, retarget),
             extras=extras,
             picture=picture,
             force=force,
@@ -122,7 +150,12 @@ def _show(screen: Screen, file: Path, done: Reconstruction, stature: float | Non
     from sixpoint.jobs.reconstruct import STATURE
 
     screen.say(f"{file}: {describe.describe_length(len(done.targets), done.targets.rate)}", style="bold")
-    if done.opened is None:
+    if done.avatar is not None:
+        described = (
+            f"{done.avatar.name}, {done.avatar.kind}, {describe.plural(len(done.figure.skeleton), 'joint')}"
+        )
+        screen.rows([("avatar", described), *describe.describe_figure(done.figure)])
+    elif done.opened is None:
         chosen = "" if stature else "; give your own with --stature or --skeleton"
         screen.rows([("figure", f"built-in, {STATURE if stature is None else stature:g} m tall{chosen}")])
     else:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError
-from sixpoint.formats import TARGET_SUFFIXES, save, save_targets
+from sixpoint.formats import SAVED_SUFFIXES, TARGET_SUFFIXES, load_avatar, save, save_targets
 from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.writing import check_output, keep_sources
 
-OUTPUTS = (".bvh", ".amc", *TARGET_SUFFIXES)
+OUTPUTS = (*SAVED_SUFFIXES, *TARGET_SUFFIXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,9 @@ def convert(
         opened = open_motion(source, reading)
         keep_sources(files, [source, opened.skeleton])
         content = opened.motion
-        save(content, out, force=force, unit=out_unit, up=out_up)
+        keeps = opened.avatar is not None and out.suffix.lower() in (".glb", ".vrma")
+        avatar = load_avatar(source, mapping) if keeps else None  # its meshes, or its humanoid map
+        save(content, out, force=force, unit=out_unit, up=out_up, avatar=avatar)
     return Conversion(content, files)
 
 
@@ -81,5 +82,5 @@ def _read_points(
     if from_targets:
         return open_targets(source, reading)
     opened = open_motion(source, reading)
-    points = Figure.from_motion(opened.whole, mapping).targets(opened.motion)
+    points = opened.find_figure(mapping).targets(opened.motion)
     return points if rotations else replace(points, rotations=None)

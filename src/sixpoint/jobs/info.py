@@ -7,7 +7,8 @@ from pathlib import Path
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FigureError
+from sixpoint.errors import FigureError, FormatError
+from sixpoint.formats import Avatar, load_avatar
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 
 
@@ -20,12 +21,14 @@ class MotionInfo:
         opened: What was read.
         figure: The anatomy of its rig; None where the rig is not a human's.
         problem: Why there is no figure.
+        avatar: What the file is as an avatar, if it may be one.
     """
 
     path: Path
     opened: Opened
     figure: Figure | None
     problem: str = ""
+    avatar: Avatar | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,12 @@ def inspect(
     if is_targets(path):
         return TargetsInfo(path, open_targets(path, reading))
     opened = open_motion(path, reading)
+    if opened.avatar is not None:
+        try:
+            avatar = load_avatar(path, mapping)
+        except FormatError as error:  # the motion was read: no human, or a mesh that is not supported
+            return MotionInfo(path, opened, None, str(error).removeprefix(f"{path}: "))
+        return MotionInfo(path, opened, avatar.figure, avatar=avatar)
     try:
         return MotionInfo(path, opened, Figure.from_motion(opened.whole, mapping))
     except FigureError as error:

@@ -5,10 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sixpoint.body.figure import Figure
+from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
-from sixpoint.formats import MOTION_SUFFIXES, TARGET_SUFFIXES, find_skeleton, load, load_targets
+from sixpoint.formats import (
+    GLTF_SUFFIXES,
+    MOTION_SUFFIXES,
+    TARGET_SUFFIXES,
+    find_skeleton,
+    load,
+    load_avatar,
+    load_targets,
+)
 
 ALL = slice(None)
 
@@ -41,12 +51,28 @@ class Opened:
         whole: All frames of the file.
         skeleton: The ASF that was used, if any.
         searched: Whether that ASF was found beside the file rather than named.
+        avatar: The file, where it is one that may hold an avatar.
     """
 
     motion: Motion
     whole: Motion
     skeleton: Path | None = None
     searched: bool = False
+    avatar: Path | None = None
+
+    def find_figure(self, mapping: Path | None = None, limits: Limits | None = None) -> Figure:
+        """The anatomy of the motion's rig; an avatar's humanoid map and shape come along.
+
+        Args:
+            mapping: A TOML table role -> joint name for what cannot be found.
+            limits: Joint limits; the shipped table by default.
+
+        Raises:
+            SixpointError: It was not found.
+        """
+        if self.avatar is not None:
+            return load_avatar(self.avatar, mapping, limits).figure
+        return Figure.from_motion(self.whole, mapping, limits)
 
 
 def parse_frames(text: str) -> slice:
@@ -90,7 +116,8 @@ def open_motion(path: Path, reading: Reading) -> Opened:
     whole = load(path, skeleton=skeleton, unit=reading.unit, up=reading.up, rate=reading.rate)
     _check_frames(path, reading.frames, len(whole))
     motion = whole if reading.frames == ALL else whole.sliced(reading.frames)
-    return Opened(motion, whole, skeleton, searched)
+    avatar = path if path.suffix.lower() in GLTF_SUFFIXES else None
+    return Opened(motion, whole, skeleton, searched, avatar)
 
 
 def open_targets(path: Path, reading: Reading) -> Targets:

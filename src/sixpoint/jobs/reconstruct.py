@@ -1,7 +1,8 @@
 """Six points to a whole body: of a recording, to be compared with it, or of tracked targets.
 
 A recording gives the points and is the truth: the result is measured against it, on the same rig. Targets
-have no truth; they are posed on a rig that is given, or on the built-in figure.
+have no truth; they are posed on a rig that is given, or on the built-in figure. An avatar is posed for the
+points of either, carried over to its proportions; it has no truth then.
 """
 
 from __future__ import annotations
@@ -9,18 +10,24 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sixpoint.body.appearance import Appearance
 from sixpoint.body.figure import Figure
+from sixpoint.body.flesh import build_shape
 from sixpoint.body.motion import Motion
+from sixpoint.body.retargeting import Mode
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, SixpointError
-from sixpoint.formats import MOTION_SUFFIXES, save
+from sixpoint.errors import FormatError, SixpointError, listed
+from sixpoint.formats import MOTION_SUFFIXES, SAVED_SUFFIXES, Avatar, save
+from sixpoint.jobs.driving import drive, open_avatar
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.jobs.writing import check_output, keep_sources
+from sixpoint.render.colours import paint
 from sixpoint.study.metrics import Errors, compute_errors
 
-OUTPUTS = (".bvh", ".amc")
+OUTPUTS = SAVED_SUFFIXES
+AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
 STATURE = 1.75
 """Stature of the built-in figure where none is given [m]."""
 
@@ -33,11 +40,17 @@ class Body:
         rig: A motion file whose rig is posed for targets; None: the built-in figure.
         stature: Of the built-in figure [m]; None: ``STATURE``.
         mapping: A TOML table role -> joint name, for an unusual rig.
+        avatar: A .glb, .gltf or .vrm to pose instead; ``stature`` then is that of whose points they are.
+        avatar_mapping: As ``mapping``, for the avatar's bones.
+        mode: What is kept for an avatar of other proportions: see ``jobs.retarget``.
     """
 
     rig: Path | None = None
     stature: float | None = None
     mapping: Path | None = None
+    avatar: Path | None = None
+    avatar_mapping: Path | None = None
+    mode: Mode = "relative"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +60,11 @@ class Reconstruction:
     Attributes:
         figure: Who was posed.
         opened: The recording, or the rig of the targets; None for the built-in figure.
-        targets: The six points.
+        targets: The six points; of an avatar those carried over to it.
         solved: Postures, status and residuals.
-        errors: Against the recording; None for targets.
+        errors: Against the recording; None for targets and avatars.
         files: What was written.
+        avatar: Who was posed, if it is one.
     """
 
     figure: Figure
@@ -59,6 +73,7 @@ class Reconstruction:
     solved: Solved
     errors: Errors | None
     files: list[Path]
+    avatar: Avatar | None = None
 
 
 def reconstruct(
@@ -77,7 +92,8 @@ def reconstruct(
 
     Args:
         source: A motion or targets.
-        out: A .bvh, or an .amc with its .asf beside it; by default ``<stem>_<method>.bvh`` here.
+        out: A .bvh, an .amc with its .asf beside it, a .glb or a .vrma; by default ``<stem>_<method>.bvh``
+            here, of an avatar ``<stem>_<avatar>.glb``.
         reading: How to read the source.
         solving: Method and options.
         body: Whom to pose; for a motion only the mapping counts, the rig is its own.
@@ -91,9 +107,11 @@ def reconstruct(
     """
     reading, solving, body = reading or Reading(), solving or Solving(), body or Body()
     solving.check()
-    out = out or Path(f"{source.stem}_{solving.method}.bvh")
     points_only = is_targets(source)
     _check_request(points_only, body, extras, picture)
+    if body.avatar is not None:
+        return _drive_avatar(source, out, reading, solving, body, force, progress)
+    out = out or Path(f"{source.stem}_{solving.method}.bvh")
     files = check_output(out, OUTPUTS, force, "for the six points: sixpoint convert")
     files += check_output(picture, (".png",), force) if picture else []
     if points_only:
@@ -106,7 +124,7 @@ def reconstruct(
     truth = None if points_only else like
     result = finish(solved.solution.motion, figure, like, truth if extras else None)
     errors = compute_errors(figure, truth, result) if truth else None
-    save(replace(result, name=out.stem), out, force=force)
+    _save(figure, replace(result, name=out.stem), out, force)
     if picture and truth:
         _draw(figure, truth, result, picture, solving.method)
     return Reconstruction(figure, opened, targets, solved, errors, files)
@@ -130,7 +148,54 @@ def finish(result: Motion, figure: Figure, like: Motion | None, extras: Motion |
     return result
 
 
+def _save(figure: Figure, result: Motion, out: Path, force: bool) -> None:
+    """Write a motion; a .glb with the figure's surface, or the built-in one."""
+    if out.suffix.lower() != ".glb":
+        save(result, out, force=force)
+        return
+    shape = figure.shape or build_shape(figure)
+    save(result, out, force=force, shape=shape, appearance=Appearance(paint(figure, shape)))
+
+
+def _drive_avatar(
+    source: Path,
+    out: Path | None,
+    reading: Reading,
+    solving: Solving,
+    body: Body,
+    force: bool,
+    progress: Progress,
+) -> Reconstruction:
+    assert body.avatar is not None
+    out = out or Path(f"{source.stem}_{body.avatar.stem}.glb")
+    files = check_output(out, AVATAR_OUTPUTS, force, "an avatar is written as one of these")
+    keep_sources(files, [source, body.rig, body.mapping, body.avatar, body.avatar_mapping])
+    avatar = open_avatar(body.avatar, body.avatar_mapping, solving.load_limits())
+    opened = None
+    if is_targets(source):
+        recording: Motion | Targets = open_targets(source, reading)
+        owner: Figure | float | None = body.stature
+    else:
+        opened = open_motion(source, replace(reading, skeleton=body.rig))
+        recording, owner = opened.motion, opened.find_figure(body.mapping)
+    targets, solved = drive(
+        avatar.figure, recording, owner, mode=body.mode, solving=solving, progress=progress
+    )
+    result = replace(solved.solution.motion, name=out.stem)
+    save(result, out, force=force, avatar=None if out.suffix.lower() == ".bvh" else avatar)
+    return Reconstruction(avatar.figure, opened, targets, solved, None, files, avatar)
+
+
 def _check_request(points_only: bool, body: Body, extras: bool, picture: Path | None) -> None:
+    if body.avatar is None and (body.avatar_mapping is not None or body.mode != "relative"):
+        raise SixpointError("--avatar-mapping and --retarget are for an avatar: give it with --avatar")
+    if body.avatar is not None:
+        if extras or picture:
+            raise SixpointError("--extras and --picture are for the recording's own rig, not for an avatar")
+        if points_only and (body.rig is not None or body.mapping is not None):
+            raise SixpointError(
+                "with --avatar six points are posed on the avatar: leave out --skeleton and --mapping"
+            )
     if points_only:
         if extras:
             raise SixpointError("--extras copies from a recording; targets hold six points only")
@@ -147,7 +212,7 @@ def _prepare_motion(
 ) -> tuple[Figure, Opened | None, Targets]:
     limits = solving.load_limits()
     opened = open_motion(source, replace(reading, skeleton=body.rig))
-    figure = Figure.from_motion(opened.whole, body.mapping, limits)
+    figure = opened.find_figure(body.mapping, limits)
     return figure, opened, figure.targets(opened.motion)
 
 
@@ -161,9 +226,9 @@ def _prepare_targets(
             raise SixpointError("--mapping names joints of a rig: give the rig with --skeleton")
         return Figure.from_stature(STATURE if body.stature is None else body.stature, limits), None, targets
     if body.rig.suffix.lower() not in MOTION_SUFFIXES:
-        raise FormatError(body.rig, "the rig of targets is a .bvh, .asf or .amc file")
+        raise FormatError(body.rig, f"the rig of targets is one of {listed(MOTION_SUFFIXES)}")
     opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))
-    return Figure.from_motion(opened.whole, body.mapping, limits), opened, targets
+    return opened.find_figure(body.mapping, limits), opened, targets
 
 
 def _draw(figure: Figure, truth: Motion, result: Motion, picture: Path, method: str) -> None:

@@ -13,7 +13,8 @@ from math import acos, asin, cos, sin
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
-from sixpoint.calibration.model import ANKLE_HEIGHT, stature_of
+from sixpoint.body.stature import stature_of
+from sixpoint.calibration.model import ANKLE_HEIGHT
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.live.chains import Quaternion, trace

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.calibration.model import ANKLE_HEIGHT, stature_of
+from sixpoint.body.stature import stature_of
+from sixpoint.calibration.model import ANKLE_HEIGHT
 from sixpoint.errors import TargetError
 from sixpoint.live.stepping import Stepping, wrap
 

@@ -12,11 +12,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from sixpoint.body.human_bones import HUMAN_BONES
 from sixpoint.errors import PacketError
 from sixpoint.live import osc
 from sixpoint.live.readings import Kind, Packet, Reading, as_name, as_position, as_rotation
 from sixpoint.live.unity import mirror_position, mirror_rotation
-from sixpoint.live.vmc_bones import HUMAN_BONES
 
 ROOT = "/VMC/Ext/Root/Pos"
 BONE = "/VMC/Ext/Bone/Pos"

@@ -10,13 +10,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from sixpoint.body.figure import Figure
+from sixpoint.body.human_bones import BonePoser
 from sixpoint.body.motion import Pose
 from sixpoint.live import vmc
 from sixpoint.live.osc import Message, make_message
 from sixpoint.live.osc_write import encode, join_bundles, pad_string
 from sixpoint.live.readings import LOST, NO_ROTATION, Reading
 from sixpoint.live.unity import mirror_position, mirror_rotation
-from sixpoint.live.vmc_bones import BonePoser
 
 MAX_BUNDLE = 1396
 """Bundles stay below 1400 bytes, so that no network splits them."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
+from sixpoint.body.human_bones import find_bones
 from sixpoint.body.motion import Pose
 from sixpoint.errors import PacketError, TargetError, listed
 from sixpoint.live import osc
@@ -25,7 +26,6 @@ from sixpoint.live.osc_write import encode, join_bundles
 from sixpoint.live.readings import NO_ROTATION, Kind, Packet, Quaternion, Reading, as_position
 from sixpoint.live.unity import from_unity_euler, mirror_position, to_unity_euler
 from sixpoint.live.vmc import numbers_of
-from sixpoint.live.vmc_bones import find_bones
 from sixpoint.live.vmc_write import MAX_BUNDLE
 
 PREFIX = "/tracking/trackers/"

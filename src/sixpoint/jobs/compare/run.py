@@ -67,7 +67,7 @@ def open_clip(clip: Clip, limits: Limits | None = None) -> OpenClip:
     """
     frames = parse_frames(clip.frames) if clip.frames else ALL
     opened = open_motion(clip.file, Reading(skeleton=clip.skeleton, frames=frames))
-    figure = Figure.from_motion(opened.whole, clip.mapping, limits)
+    figure = opened.find_figure(clip.mapping, limits)
     truth = opened.motion
     targets = figure.targets(truth)
     targets = Targets(targets.positions, targets.rate, name=targets.name)

@@ -14,7 +14,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, SixpointError
+from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES
 from sixpoint.jobs.reading import Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.reconstruct import STATURE, Body
@@ -93,7 +93,7 @@ def open_clips(
             clip = Clip(path.name, _free_figure(body, reading, limits), targets)
         else:
             opened = open_motion(path, replace(reading, skeleton=body.rig))
-            figure = Figure.from_motion(opened.whole, body.mapping, limits)
+            figure = opened.find_figure(body.mapping, limits)
             clip = _of_motion(opened.motion, figure, path.name)
         again = sum(clip.name == other.name for other in clips)
         clips.append(replace(clip, name=str(path)) if again else clip)
@@ -110,9 +110,9 @@ def _free_figure(body: Body, reading: Reading, limits: Limits | None) -> Figure:
     if body.stature is not None:
         raise SixpointError("--skeleton and --stature exclude each other")
     if body.rig.suffix.lower() not in MOTION_SUFFIXES:
-        raise FormatError(body.rig, "a rig is a .bvh, .asf or .amc file")
+        raise FormatError(body.rig, f"a rig is one of {listed(MOTION_SUFFIXES)}")
     opened = open_motion(body.rig, Reading(unit=reading.unit, up=reading.up))
-    return Figure.from_motion(opened.whole, body.mapping, limits)
+    return opened.find_figure(body.mapping, limits)
 
 
 def known_rotations(clip: Clip, frame: int) -> Array:

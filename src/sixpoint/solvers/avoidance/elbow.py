@@ -174,8 +174,9 @@ def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
 def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, step):
     """The allowed swivel angle nearest to ``about``, looked for in growing steps to both sides.
 
-    ``most`` is the arm's distance from the trunk at ``about`` [m], if limits allow that. The side of the sign ``first`` is looked at first. Where there is none, the one within the limits at which
-    the arm is least deep in the trunk; ``about`` where limits allow none.
+    ``most`` is the arm's distance from the trunk at ``about`` [m], if limits allow that. The side of the sign
+    ``first`` is looked at first. Where no angle is allowed, the one within the limits at which the arm is
+    least deep in the trunk; ``about`` where limits allow none.
     """
     best, most = about, most + TOUCH
     last, offset = 0.0, min(step, pi)

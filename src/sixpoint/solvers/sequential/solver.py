@@ -38,8 +38,8 @@ class SequentialIK(SixPointSolver):
         align_pelvis: Twist the trunk about the line pelvis-head after it is placed, so that the pelvis'
             X axis is as near as possible to its estimate (not in the paper).
         avoid: "elbows" keeps elbows out of the trunk (the paper's section 8), by the figure's shape or,
-            without one, by elliptic cylinders; "forearms" also forearms and hands, out of trunk and head. Wrists
-            stay on their targets; nothing is avoided by default.
+            without one, by elliptic cylinders; "forearms" also forearms and hands, out of trunk and head.
+            Wrists stay on their targets; nothing is avoided by default.
 
     Raises:
         SixpointError: An option has an impossible value.

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.motion import Pose
+from sixpoint.body.motion import Motion, Pose
 
 Array = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def find_bones(figure: Figure, upper_chest: bool = False) -> dict[str, Bone]:
 
 
 class BonePoser:
-    """Turns poses of a figure into local bone rotations, a few NumPy calls a frame.
+    """Turns poses of a figure, or whole motions, into local bone rotations, a few NumPy calls a frame.
 
     Attributes:
         bones: Unity's name -> bone.
@@ -150,20 +150,24 @@ class BonePoser:
         longest = max(map(len, paths))
         self._paths = np.array([[*path, *[joints] * (longest - len(path))] for path in paths])
 
-    def compute_rotations(self, pose: Pose) -> Array:
-        """(B, 4) local rotations from the T-pose, in sixpoint's axes; the hips' is in the world."""
-        local = np.concatenate([pose.rotations, rot.IDENTITY[None]])
+    def compute_rotations(self, pose: Pose | Motion) -> Array:
+        """(B, 4) local rotations from the T-pose, in sixpoint's axes; the hips' is in the world.
+
+        Of a motion (F, B, 4).
+        """
+        outside = np.broadcast_to(rot.IDENTITY, (*pose.rotations.shape[:-2], 1, 4))
+        local = np.concatenate([pose.rotations, outside], axis=-2)
         turned = self._before
         for joints in self._paths.T:
-            turned = rot.mul(turned, local[joints])
+            turned = rot.mul(turned, local[..., joints, :])
         return rot.mul(turned, self._after)
 
-    def compute_hips(self, pose: Pose) -> Array:
-        """(3,) world position of the pelvis joint [m]."""
-        moved = dict(zip(pose.moving, pose.translations, strict=True))
-        position, turned = moved[0], pose.rotations[0]
+    def compute_hips(self, pose: Pose | Motion) -> Array:
+        """(3,) world position of the pelvis joint [m]; of a motion (F, 3)."""
+        moved = {joint: pose.translations[..., k, :] for k, joint in enumerate(pose.moving)}
+        position, turned = moved[0], pose.rotations[..., 0, :]
         for joint in self.figure.skeleton.path(0, self.figure.roles.pelvis)[1:]:
             local = moved.get(joint, self.figure.skeleton.offsets[joint])
             position = position + rot.mul_vec(turned, local)
-            turned = rot.mul(turned, pose.rotations[joint])
+            turned = rot.mul(turned, pose.rotations[..., joint, :])
         return np.asarray(position, float)

@@ -1,0 +1,78 @@
+"""Avatars that move as somebody else did: retargeted six points, posed on the avatar's own bones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sixpoint.body.figure import Figure
+from sixpoint.body.limits import Limits
+from sixpoint.body.motion import Motion
+from sixpoint.body.retargeting import Mode
+from sixpoint.body.targets import Targets
+from sixpoint.errors import FormatError, listed
+from sixpoint.formats import GLTF_SUFFIXES, Avatar, load_avatar
+from sixpoint.jobs.progress import Progress, silent
+from sixpoint.jobs.retarget import retarget
+from sixpoint.jobs.solving import Solved, Solving, solve
+
+SAME = 1e-3
+"""Part of a body's height within which bones are the same."""
+AVATARS = tuple(suffix for suffix in GLTF_SUFFIXES if suffix != ".vrma")
+
+
+def open_avatar(path: Path, mapping: Path | None = None, limits: Limits | None = None) -> Avatar:
+    """Read an avatar.
+
+    Args:
+        path: A .glb, .gltf or .vrm.
+        mapping: A TOML table role -> joint name, for unusual bones.
+        limits: Joint limits; the shipped table by default.
+
+    Raises:
+        FormatError: It is no such file, or holds no human.
+    """
+    if path.suffix.lower() not in AVATARS:
+        raise FormatError(path, f"an avatar is one of {listed(AVATARS)}")
+    return load_avatar(path, mapping, limits)
+
+
+def is_on(motion: Motion, figure: Figure) -> bool:
+    """Whether a motion is on a figure's own skeleton, so that nothing has to be solved.
+
+    Names alone do not tell: bodies of other proportions share them.
+    """
+    ours, other = figure.skeleton, motion.skeleton
+    if other.names != ours.names or not np.array_equal(other.parents, ours.parents):
+        return False
+    return bool(np.abs(other.offsets[1:] - ours.offsets[1:]).max(initial=0.0) < SAME * figure.height)
+
+
+def drive(
+    figure: Figure,
+    recording: Motion | Targets,
+    source: Figure | float | None = None,
+    *,
+    mode: Mode = "relative",
+    solving: Solving | None = None,
+    progress: Progress = silent,
+) -> tuple[Targets, Solved]:
+    """Pose a figure as another body was.
+
+    Args:
+        figure: Whom to pose.
+        recording: A motion, or six points.
+        source: Whose: a figure, or a stature [m] for six points; None: found from the recording.
+        mode: "relative" keeps the pose, "absolute" what hands and feet touch.
+        solving: Method and options.
+        progress: Told how far the work is.
+
+    Returns:
+        The six points for the figure, and its postures.
+
+    Raises:
+        SixpointError: The recording's body cannot be found, or an option is unknown.
+    """
+    targets = retarget(recording, figure, mode, source=source)
+    return targets, solve(figure, targets, solving or Solving(), progress)
