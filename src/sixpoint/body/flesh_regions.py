@@ -17,7 +17,7 @@ Index = NDArray[np.int64]
 HEIGHT = 1.6  # Figure.height for which lengths are given [m]
 SPACING = 0.012  # m, between points of a surface
 TRUNK, NECK, HEAD, UPPER, LOWER, HAND, THIGH, SHANK, FOOT = range(9)
-SHARE = 0.98  # of the vertices around a bone that its radius encloses
+SHARE = 0.995  # of the vertices around a bone that its radius encloses
 
 # A trunk without a shape, from the hips (0) to the shoulders (1), for a height of 1.6 m: half width over
 # that of hips or shoulders and half depth [m]. Rounded proportions of a lean adult.

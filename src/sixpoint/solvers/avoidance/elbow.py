@@ -28,7 +28,7 @@ GROWTH = 1.7  # of the steps in which a free swivel angle is looked for
 LEAST_STEP, LARGEST_STEP = pi / 90, pi / 15  # rad
 REFINEMENTS = 4
 ENOUGH = 2e-3  # rad, an angle that is free by less is at the edge
-HALVES = 5  # times that a turn is halved where limits forbid it
+HALVES = 6  # times that a turn is halved where limits forbid it, or a step where no angle is free
 STRAIGHT = 0.01  # sine between upper arm and target below which a swivel angle moves nothing
 GIVES = 0.02  # m, an arm that misses by so much gives way wholly
 TOUCH = 5e-4  # m, by which an elbow that is let out stays clear
@@ -171,6 +171,22 @@ def refine(arm, circle, flesh, root, world, segs, balls, inside, outside):
 
 
 @helper
+def least_deep(arm, circle, flesh, root, world, segs, balls, best, most):
+    """The angle near ``best`` within the limits at which the arm is least deep, by steps that are halved."""
+    step = 0.5 * LARGEST_STEP
+    for _ in range(HALVES):
+        middle = best
+        for i in range(2):
+            phi = middle + (2 * i - 1) * step
+            if within(arm, circle, balls, phi):
+                gap = gap_at(arm, circle, flesh, root, world, segs, phi)
+                if gap > most:
+                    best, most = phi, gap
+        step *= 0.5
+    return best
+
+
+@helper
 def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, step):
     """The allowed swivel angle nearest to ``about``, looked for in growing steps to both sides.
 
@@ -192,7 +208,7 @@ def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, 
                 if gap > most:
                     best, most = phi, gap
         if offset >= pi:
-            return best
+            return least_deep(arm, circle, flesh, root, world, segs, balls, best, most)
         last, offset = offset, min(GROWTH * offset, offset + LARGEST_STEP, pi)
 
 
