@@ -35,21 +35,34 @@ SEEDS = (1, 2, 3, 4, 5, 6)
 
 
 class Meter:
-    """Depth of the elbows in the trunk of a figure with a shape of named parts."""
+    """Depth of the elbows in the trunk of a figure with a shape of named parts.
 
-    def __init__(self, figure: sp.Figure, near: float = NEAR) -> None:
+    With ``forearms``, of what is beyond the elbows, hands included, in trunk and head.
+    """
+
+    def __init__(self, figure: sp.Figure, forearms: bool = False) -> None:
         shape = figure.shape
         self.figure, self.shape = figure, shape
-        triangles = shape.triangles[shape.parts["trunk"]]
-        self.trunk, self.faces = np.unique(triangles, return_inverse=True)
-        self.faces = self.faces.reshape(-1, 3)
+        self.bodies = []
+        for part in ("trunk", "head") if forearms else ("trunk",):
+            ids, faces = np.unique(shape.triangles[shape.parts[part]], return_inverse=True)
+            self.bodies.append((ids, faces.reshape(-1, 3)))
         self.elbows = []
         positions, world = figure.neutral_pose.compute_transforms()
         vertices = shape.place(positions, world)
-        for side, joint in zip("lr", figure.roles.elbow, strict=True):
+        for k, side in enumerate("lr"):
+            elbow, wrist = positions[figure.roles.elbow[k]], positions[figure.roles.wrist[k]]
             arm = np.unique(shape.triangles[shape.parts[f"{side}_arm"]])
-            off = np.linalg.norm(vertices[arm] - positions[joint], axis=1)
-            self.elbows.append(arm[off < near])
+            if forearms:
+                along = (vertices[arm] - elbow) @ (wrist - elbow) / np.linalg.norm(wrist - elbow)
+                hand = np.unique(shape.triangles[shape.parts[f"{side}_hand"]])
+                self.elbows.append(np.concatenate([arm[along > NEAR], hand]))
+            else:
+                self.elbows.append(arm[np.linalg.norm(vertices[arm] - elbow, axis=1) < NEAR])
+
+    def place_bodies(self, vertices: Array) -> list[trimesh.Trimesh]:
+        """The closed meshes in a frame."""
+        return [trimesh.Trimesh(vertices[ids], faces, process=False) for ids, faces in self.bodies]
 
     def measure(self, motion: sp.Motion, known: tuple[sp.Motion, Array] | None = None) -> Array:
         """Depth (F, 2) of the left and the right elbow [m], 0 outside.
@@ -64,9 +77,9 @@ class Meter:
             out[frames] = 0.0
         for f in frames:
             vertices = self.shape.place(positions[f], world[f])
-            mesh = trimesh.Trimesh(vertices[self.trunk], self.faces, process=False)
+            bodies = self.place_bodies(vertices)
             for side, elbow in enumerate(self.elbows):
-                out[f, side] = depth_in(mesh, vertices[elbow])
+                out[f, side] = max(depth_in(body, vertices[elbow]) for body in bodies)
         return out
 
     def find_way_out(self, motion: sp.Motion, frame: int, side: int) -> float:
@@ -82,7 +95,7 @@ class Meter:
         line /= np.linalg.norm(line)
         below = figure.skeleton.subtree(joint)
         vertices = self.shape.place(positions, world)
-        trunk = trimesh.Trimesh(vertices[self.trunk], self.faces, process=False)
+        trunk = self.place_bodies(vertices)[0]
         least = np.inf
         for angle in np.radians(np.arange(0, 360, 5)):
             turn = Rotation.from_rotvec(angle * line)
@@ -196,6 +209,32 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def compare_forearms(figure: sp.Figure, method: str, targets: Sequence[sp.Targets]) -> str:
+    """A row: frames with forearm or hand in trunk or head, without avoidance, with elbows, with both."""
+    meters, counts, kept = (Meter(figure, forearms=True), Meter(figure)), [], []
+    options = ({}, {"avoid": "elbows"}, {"avoid": ("elbows", "forearms")})
+    solvers = [sp.make_solver(method, figure, **more) for more in options]
+    found = [[solver.solve_frames(part) for part in targets] for solver in solvers]
+    missed = [np.concatenate([s.residual[:, 2:4] for s in of]) for of in found]
+    for of, miss in zip(found, missed, strict=True):
+        deep = [np.concatenate([meter.measure(s.motion) for s in of]).max(axis=1) > DEEP for meter in meters]
+        counts.append([int(d.sum()) for d in deep])
+        kept.append(100.0 * (miss[missed[0] < 1e-3] < 1e-3).mean())
+    plain, both = time_pair(solvers[0], solvers[2], targets)
+    arms, elbows = zip(*counts, strict=True)
+    return (
+        f"| `{method}` | {len(missed[0])} | {arms[0]} | {arms[1]} | {arms[2]} | {elbows[0]} | {elbows[2]} "
+        f"| {kept[2]:.2f} % | x {both / plain:.2f} |"
+    )
+
+
+FOREARMS = (
+    "| method | frames | forearm or hand deeper than 5 mm | elbows avoided | forearms too "
+    "| elbow deeper than 5 mm | forearms too | on target without, still within 1 mm | time |\n"
+    "|---|---|---|---|---|---|---|---|---|"
+)
+
+
 def boxing_targets(figure: sp.Figure, folder: Path) -> tuple[sp.Figure, sp.Targets, str]:
     """The paper's boxing clip on its own rig, or the built-in motion where it is absent; and which it is."""
     path = folder / "paper" / "17_10.amc"
@@ -223,6 +262,9 @@ def main() -> None:
         targets = [make(figure, seed, frames) for seed in SEEDS]
         parts[part] = table([compare(figure, m, targets, meter) for m in METHODS])
         print(f"{part}\n\n{parts[part]}\n", flush=True)
+    targets = [reach_across(figure, seed, min(options.frames, 100)) for seed in SEEDS]
+    parts["forearms"] = "\n".join([FOREARMS, *(compare_forearms(figure, m, targets) for m in METHODS)])
+    print(f"forearms\n\n{parts['forearms']}\n", flush=True)
     own, boxing, name = boxing_targets(figure, options.data)
     rows = [compare(own, m, [boxing], Meter(own)) for m in METHODS]
     parts["boxing"] = f"On {name}:\n\n{table(rows)}"
