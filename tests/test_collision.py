@@ -256,3 +256,16 @@ def test_what_cannot_be_avoided_is_said():
         sp.SequentialIK(figure, avoid="knees")
     with pytest.raises(SixpointError, match="no option avoid; sik"):
         sp.make_solver("dls", figure, avoid="elbows")
+
+
+def test_the_job_avoids_with_the_built_in_surface():
+    """``reconstruct --avoid`` gives a figure without a surface the built-in one."""
+    from sixpoint.jobs.solving import Solving, solve
+
+    figure = sp.Figure.from_stature(1.75)
+    solving, targets = Solving("sik", avoid=("elbows",)), crossing(figure, 20)
+    solving.check()
+    found = solve(figure, targets, solving).solution.motion
+    fleshy = figure.with_shape(build_shape(figure))
+    wanted = sp.SequentialIK(fleshy, avoid="elbows").solve_motion(targets)
+    assert np.array_equal(found.rotations, wanted.rotations)
