@@ -19,13 +19,13 @@ from sixpoint.solvers.avoidance.clearance import OUTSIDE, deepest, gap_of_arm
 from sixpoint.solvers.sequential.limb import close_on, fold, turn_about_itself
 from sixpoint.solvers.sequential_plus.limbs import carried_angle, is_free, slack
 from sixpoint.solvers.six_points.packing import limb_row
-from sixpoint.solvers.tgb.swivel import direction, root_at, triangle
+from sixpoint.solvers.tgb.swivel import across, direction, hinge_at, root_at, triangle
 
 K = 1.0  # of a bent arm's turn
 MET = 1e-3  # m, an arm that misses by less is on its target
-STRETCHES = 3  # turns of a stretched arm
+STRETCHES = 2  # turns of a stretched arm
 GROWTH = 1.7  # of the steps in which a free swivel angle is looked for
-LEAST_STEP, LARGEST_STEP = pi / 90, pi / 15  # rad
+LEAST_STEP, LARGEST_STEP, COARSE_STEP = pi / 90, pi / 15, pi / 4  # rad
 REFINEMENTS = 4
 ENOUGH = 2e-3  # rad, an angle that is free by less is at the edge
 HALVES = 6  # times that a turn is halved where limits forbid it, or a step where no angle is free
@@ -106,7 +106,7 @@ def make_circle(arm, elbow):
     """The circle of an elbow, given from the shoulder in the arm's frame."""
     n, distance = direction(arm.target)
     d, cosine, sine, _ = triangle(distance, arm.l1, arm.l2)
-    u = vec.unit(vec.reject(elbow, n))
+    u = across(elbow, n)
     r = arm.l1 * sine
     return Circle(
         n,
@@ -187,12 +187,12 @@ def least_deep(arm, circle, flesh, root, world, segs, balls, best, most):
 
 
 @helper
-def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, step):
-    """The allowed swivel angle nearest to ``about``, looked for in growing steps to both sides.
+def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, step, widest):
+    """The allowed swivel angle nearest to ``about``, looked for in steps to both sides, ``widest`` at most.
 
     ``most`` is the arm's distance from the trunk at ``about`` [m], if limits allow that. The side of the sign
     ``first`` is looked at first. Where no angle is allowed, the one within the limits at which the arm is
-    least deep in the trunk; ``about`` where limits allow none.
+    least deep in the trunk; ``about`` where limits allow none, or ``most`` is OUTSIDE.
     """
     best, most = about, most + TOUCH
     last, offset = 0.0, min(step, pi)
@@ -208,8 +208,10 @@ def find_free(arm, circle, flesh, root, world, segs, balls, about, most, first, 
                 if gap > most:
                     best, most = phi, gap
         if offset >= pi:
+            if most >= OUTSIDE:
+                return about
             return least_deep(arm, circle, flesh, root, world, segs, balls, best, most)
-        last, offset = offset, min(GROWTH * offset, offset + LARGEST_STEP, pi)
+        last, offset = offset, min(GROWTH * offset, offset + widest, pi)
 
 
 @helper
@@ -227,23 +229,24 @@ def close_arm(arm, balls, upper):
 
 
 @helper
-def turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, before, share):
+def turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, before, found, share):
     """An arm that misses its target turns out of the trunk, a share of the way; then closes on the target.
 
-    ``before`` is its distance from the trunk as it is [m].
+    ``before`` is its distance from the trunk as it is [m], ``found`` what is ``deepest`` there.
     """
     turned = upper
-    wrist = vec.add(arm.shoulder, qt.mul_vec(arm.frame, end))
-    for _ in range(STRETCHES):
-        here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(turned))))
-        depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+    depth, p_e, p_t = found
+    for k in range(STRETCHES):
         if depth <= TOUCH:
             break
         v = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_e, arm.shoulder)))
         w = vec.unit(qt.inv_mul_vec(arm.frame, vec.sub(p_t, arm.shoulder)))
-        turn = qt.arc(v, w, qt.x_axis(turned))
-        turned = qt.normalised(qt.mul(turn, turned))
-        wrist = vec.add(here, qt.mul_vec(arm.frame, qt.mul_vec(qt.mul(turned, hinge), (0.0, -arm.l2, 0.0))))
+        turned = qt.normalised(qt.mul(qt.arc(v, w, qt.x_axis(turned)), turned))
+        if k < STRETCHES - 1:
+            here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(turned))))
+            lower = qt.mul_vec(qt.mul(turned, hinge), (0.0, -arm.l2, 0.0))
+            wrist = vec.add(here, qt.mul_vec(arm.frame, lower))
+            depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
     turned = qt.normalised(qt.mul(upper, qt.scaled(qt.inv_mul(upper, turned), share)))
     root_turn, bent, there = close_arm(arm, balls, turned)
     here = vec.add(arm.shoulder, qt.mul_vec(arm.frame, vec.scale(-arm.l1, qt.y_axis(root_turn))))
@@ -265,15 +268,26 @@ def clear_arm(arm, flesh, root, world, segs, balls, upper, hinge, end):
     gap = gap_of_arm(flesh, root, world, segs, arm.shoulder, here, wrist)
     if gap >= 0.0:
         return upper, hinge, end
-    if vec.norm(vec.sub(end, arm.target)) > MET:
-        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, 1.0)
     circle = make_circle(arm, elbow)
+    if vec.norm(vec.sub(end, arm.target)) > MET:
+        d, _, _, flexion = triangle(vec.norm(arm.target), arm.l1, arm.l2)
+        if circle.sine >= STRAIGHT and (not arm.limits or arm.low <= flexion <= arm.high):
+            # Another angle may be free and meet the target, which the limits kept this one from.
+            first = 1.0 if vec.dot(circle.beside, vec.sub(arm.shoulder, root)) >= 0.0 else -1.0
+            phi = find_free(
+                arm, circle, flesh, root, world, segs, balls, 0.0, OUTSIDE, first, COARSE_STEP, COARSE_STEP
+            )
+            if within(arm, circle, balls, phi) and gap_at(arm, circle, flesh, root, world, segs, phi) >= 0.0:
+                turned = root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi)
+                return turned, hinge_at(-1.0, flexion), vec.scale(d, circle.n)
+        found = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, found, 1.0)
     if circle.sine < STRAIGHT:
         return upper, hinge, end
     depth, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
     outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
     step = max(K * depth / arm.l1, LEAST_STEP)
-    phi = find_free(arm, circle, flesh, root, world, segs, balls, 0.0, gap, outward, step)
+    phi = find_free(arm, circle, flesh, root, world, segs, balls, 0.0, gap, outward, step, LARGEST_STEP)
     return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
 
 
@@ -294,7 +308,8 @@ def clear_arm_steadily(arm, flesh, root, world, segs, balls, upper, hinge, end, 
     missed = vec.norm(vec.sub(end, arm.target))
     if missed > MET:
         share = min((missed - MET) / GIVES, 1.0)
-        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, share)
+        found = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
+        return turn_stretched(arm, flesh, root, world, segs, balls, upper, hinge, end, gap, found, share)
     circle = make_circle(arm, elbow)
     if circle.sine < STRAIGHT:
         return upper, hinge, end
@@ -310,7 +325,9 @@ def clear_arm_steadily(arm, flesh, root, world, segs, balls, upper, hinge, end, 
             return root_at(circle.n, circle.u, circle.cosine, circle.sine, -1.0, phi), hinge, end
     _, p_e, p_t = deepest(flesh, root, world, segs, arm.shoulder, here, wrist)
     outward = 1.0 if vec.dot(circle.beside, vec.sub(p_t, p_e)) >= 0.0 else -1.0
-    phi = find_free(arm, circle, flesh, root, world, segs, balls, before, at_before, outward, LEAST_STEP)
+    phi = find_free(
+        arm, circle, flesh, root, world, segs, balls, before, at_before, outward, LEAST_STEP, LARGEST_STEP
+    )
     turn = min(max(phi - before, -far), far)
     for _ in range(HALVES):
         if within(arm, circle, balls, before + turn):
