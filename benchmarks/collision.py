@@ -212,7 +212,8 @@ def table(rows: Sequence[Row]) -> str:
         lines.append(
             f"| `{r.method}` | {r.frames} | {r.deep[0]} | {r.deep[1]} | {fewer} "
             f"| {r.bound[0]}, {r.bound[1]} | {1e3 * r.worst[0]:.0f} mm "
-            f"| {1e3 * r.worst[1]:.0f} mm | {100 * r.kept:.2f} % of {r.met} | {r.lost[0]}: {1e3 * r.lost[1]:+.0f} mm ({1e3 * r.lost[2]:+.0f} mm) | {r.still} "
+            f"| {1e3 * r.worst[1]:.0f} mm | {100 * r.kept:.2f} % of {r.met} "
+            f"| {r.lost[0]}: {1e3 * r.lost[1]:+.0f} mm ({1e3 * r.lost[2]:+.0f} mm) | {r.still} "
             f"| {r.micro:.1f} us x {r.cost:.2f} |"
         )
     return "\n".join(lines)
