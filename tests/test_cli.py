@@ -172,6 +172,8 @@ def test_reconstruct_draws_a_picture_and_copies_extras(place, capsys):
         ("reconstruct walk.bvh --method sik --weights 0,0,0", "three numbers"),
         ("reconstruct walk.bvh --search slow", "literal"),
         ("reconstruct walk.bvh --limits absent.toml", "absent.toml"),
+        ("reconstruct walk.bvh --avoid knees", "elbows, forearms"),
+        ("reconstruct walk.bvh --avoid elbows --method dls", "sik, sik+"),
         ("reconstruct walk.bvh --mapping absent.toml", "absent.toml"),
         ("reconstruct walk.bvh --limits a.toml --no-limits", "exclude"),
         ("reconstruct walk.bvh --stature 1.7", "its own rig"),

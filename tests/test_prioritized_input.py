@@ -245,7 +245,7 @@ def test_an_orientation_need_not_be_normalised():
         ([sp.PlaneTask("head", margin=-1.0)], "lengths from 0"),
         ([sp.ObstacleTask("head", sp.Sphere(-1.0))], "lengths from 0"),
         ([sp.ObstacleTask("head", sp.Box((1.0, 2.0)))], "lengths from 0"),
-        ([sp.ObstacleTask("head", "a wall")], "Sphere, Capsule, Box or HalfSpace"),
+        ([sp.ObstacleTask("head", "a wall")], "Sphere, Capsule, Box, HalfSpace or Mesh"),
         ([sp.ObstacleTask("head", buffer=NAN)], "lengths from 0"),
         ([sp.BalanceTask(target="middle")], "'polygon' or 'point'"),
         ([sp.BalanceTask(), sp.BalanceTask(name="again")], "one balance task"),

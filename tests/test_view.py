@@ -325,7 +325,7 @@ def test_controls_become_options(method, clips):
     assert options.pop("limits") is False
     assert len(options) == len(
         {"weights" if n[0] == "w" and n[1:].isdigit() else n for n in values} - {"limits"}
-    ) - (5 if "rotations" in options else 0)
+    ) - (5 if "rotations" in options else 0) - (1 if "avoid" in options else 0)
     Posing(method, values).make(clips[0].figure)
 
 

@@ -73,6 +73,13 @@ def reconstruct(
             "or some of pelvis,head,l_wrist,r_wrist,l_ankle,r_ankle. With sik+ and sik-prior."
         ),
     ] = None,
+    avoid: Annotated[
+        str | None,
+        Parameter(
+            help="Keep `elbows` out of the trunk, or `elbows,forearms`: hands too, and out of the head. With "
+            "sik, sik+ and sik-prior."
+        ),
+    ] = None,
     limits: LimitsFile = None,
     no_limits: NoLimits = False,
     mapping: Mapping = None,
@@ -100,6 +107,7 @@ def reconstruct(
     sixpoint reconstruct 90_05.bvh --frames 1: --extras
     sixpoint reconstruct kick.bvh --method sik --weights 1,1,0
     sixpoint reconstruct walk.bvh --rotations pelvis,head
+    sixpoint reconstruct boxing.bvh --avoid elbows
     sixpoint reconstruct points.csv --stature 1.68
     sixpoint reconstruct points.csv --skeleton avatar.bvh -o avatar_moves.bvh
     sixpoint reconstruct 17_10.amc --avatar robot.glb -o boxing_robot.glb
@@ -111,7 +119,7 @@ def reconstruct(
     from sixpoint.jobs.reconstruct import reconstruct as run
     from sixpoint.jobs.solving import parse_solving
 
-    solving = parse_solving(method, weights, search, rotations, limits, no_limits)
+    solving = parse_solving(method, weights, search, rotations, limits, no_limits, avoid)
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
     screen = Screen()
     with screen.progress() as progress:

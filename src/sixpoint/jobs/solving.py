@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sixpoint.body.figure import Figure
+from sixpoint.body.flesh import build_shape
 from sixpoint.body.limits import Limits
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, listed
@@ -27,6 +28,8 @@ class Solving:
         limits: Keep joints within their limits.
         limits_file: A table of joint limits in place of the shipped one.
         rotations: Effectors whose measured rotations are used; none by default.
+        avoid: Parts of the arms that stay out of the trunk, "elbows" or "forearms"; a figure without a
+            surface has the built-in one then.
     """
 
     method: str = DEFAULT
@@ -35,6 +38,7 @@ class Solving:
     limits: bool = True
     limits_file: Path | None = None
     rotations: tuple[str, ...] = ()
+    avoid: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse a method that does not exist, and options it does not have.
@@ -60,8 +64,9 @@ class Solving:
         for name in ("weights", "search"):
             if getattr(self, name) is not None:
                 options[name] = getattr(self, name)
-        if self.rotations:
-            options["rotations"] = self.rotations
+        for name in ("rotations", "avoid"):
+            if getattr(self, name):
+                options[name] = getattr(self, name)
         return options
 
     def load_limits(self) -> Limits | None:
@@ -81,9 +86,14 @@ def parse_weights(text: str) -> tuple[float, float, float]:
     return first, second, third
 
 
+def parse_names(text: str) -> tuple[str, ...]:
+    """Names as ``elbows,forearms``."""
+    return tuple(filter(None, (word.strip() for word in text.split(","))))
+
+
 def parse_rotations(text: str) -> tuple[str, ...]:
     """Effectors as ``pelvis,head``, or ``all``; the solver says which there are."""
-    names = tuple(filter(None, (word.strip() for word in text.split(","))))
+    names = parse_names(text)
     return EFFECTORS if names == ("all",) else names
 
 
@@ -94,6 +104,7 @@ def parse_solving(
     rotations: str | None = None,
     limits: Path | None = None,
     no_limits: bool = False,
+    avoid: str | None = None,
 ) -> Solving:
     """How to solve, from the options of the command line."""
     return Solving(
@@ -103,6 +114,7 @@ def parse_solving(
         limits=not no_limits,
         limits_file=limits,
         rotations=() if rotations is None else parse_rotations(rotations),
+        avoid=() if avoid is None else parse_names(avoid),
     )
 
 
@@ -121,6 +133,8 @@ class Solved:
 
 def solve(figure: Figure, targets: Targets, solving: Solving, progress: Progress = silent) -> Solved:
     """Pose a figure for every frame; kernels are compiled before the clock starts."""
+    if solving.avoid and figure.shape is None:
+        figure = figure.with_shape(build_shape(figure))
     solver = make_solver(solving.method, figure, **solving.options)
     solver.warm_up()
     solver.solve_frames(targets.sliced(slice(0, 1)))  # arrays of the kind that follow

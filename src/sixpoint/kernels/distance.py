@@ -1,7 +1,8 @@
 """Signed distance of a point to simple shapes, in the shape's own frame, with the outward normal.
 
 A shape is a kind and three numbers: sphere (radius), capsule along Y (radius, half length of its axis), box
-(half extents), half-space below its plane y = 0.
+(half extents), half-space below its plane y = 0. A mesh is a grid of distances, as rows of four numbers: its
+first corner and spacing; the counts of corners in x, y, z; then the distances at the corners, z fastest.
 """
 
 from math import sqrt
@@ -9,7 +10,7 @@ from math import sqrt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper
 
-SPHERE, CAPSULE, BOX, HALF_SPACE = range(4)
+SPHERE, CAPSULE, BOX, HALF_SPACE, GRID = range(5)
 
 
 @helper
@@ -56,6 +57,48 @@ def signed_distance(kind, size, p):
     if kind == BOX:
         return _box(p, size)
     return (p[1], 0.0, 1.0, 0.0)
+
+
+@helper
+def _corner(grid, first, ny, nz, i, j, k):
+    n = (i * ny + j) * nz + k
+    return grid[first + 2 + n // 4, n % 4]
+
+
+@helper
+def grid_distance(grid, first, p):
+    """As ``signed_distance``, interpolated on the grid that begins in a row; the normal is the gradient.
+
+    Beside the grid, the distance at its border and that to it.
+    """
+    h = grid[first, 3]
+    nx, ny, nz = int(grid[first + 1, 0]), int(grid[first + 1, 1]), int(grid[first + 1, 2])
+    x, y, z = (p[0] - grid[first, 0]) / h, (p[1] - grid[first, 1]) / h, (p[2] - grid[first, 2]) / h
+    cx, cy, cz = min(max(x, 0.0), nx - 1.0), min(max(y, 0.0), ny - 1.0), min(max(z, 0.0), nz - 1.0)
+    i, j, k = min(int(cx), nx - 2), min(int(cy), ny - 2), min(int(cz), nz - 2)
+    u, v, w = cx - i, cy - j, cz - k
+    a, b = _corner(grid, first, ny, nz, i, j, k), _corner(grid, first, ny, nz, i, j, k + 1)
+    c, d = _corner(grid, first, ny, nz, i, j + 1, k), _corner(grid, first, ny, nz, i, j + 1, k + 1)
+    e, f = _corner(grid, first, ny, nz, i + 1, j, k), _corner(grid, first, ny, nz, i + 1, j, k + 1)
+    g, o = _corner(grid, first, ny, nz, i + 1, j + 1, k), _corner(grid, first, ny, nz, i + 1, j + 1, k + 1)
+    low0, low1 = a + w * (b - a), c + w * (d - c)
+    top0, top1 = e + w * (f - e), g + w * (o - g)
+    low, top = low0 + v * (low1 - low0), top0 + v * (top1 - top0)
+    distance = low + u * (top - low)
+    gx = (top - low) / h
+    gy = ((1.0 - u) * (low1 - low0) + u * (top1 - top0)) / h
+    gz = (1.0 - u) * ((1.0 - v) * (b - a) + v * (d - c)) + u * ((1.0 - v) * (f - e) + v * (o - g))
+    gz /= h
+    beside = (h * (x - cx), h * (y - cy), h * (z - cz))
+    off = vec.norm(beside)
+    if off > 0.0:
+        gx = beside[0] / off if beside[0] != 0.0 else gx
+        gy = beside[1] / off if beside[1] != 0.0 else gy
+        gz = beside[2] / off if beside[2] != 0.0 else gz
+        return (distance + off, gx, gy, gz)
+    if gx * gx + gy * gy + gz * gz < 1e-6:
+        return (distance, 0.0, 1.0, 0.0)
+    return (distance, gx, gy, gz)
 
 
 @helper

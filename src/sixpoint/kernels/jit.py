@@ -1,8 +1,8 @@
 """The decorators of compiled code, and where its machine code is kept.
 
 ``helper`` marks a function called from other compiled code; without compilation it stays plain Python,
-so it can be tested and debugged as such. ``algebra`` is a helper for sums over rows. ``entry`` marks the few
-functions called from Python.
+so it can be tested and debugged as such. ``algebra`` is a helper for sums over rows, ``specialised`` one with
+parts that an argument None leaves out. ``entry`` marks the few functions called from Python.
 
 Numba does not notice an edit to a callee in another file, so the cache folder is named by a hash of all
 compiled sources. Where no folder can be written, code is compiled anew in each process.
@@ -44,6 +44,15 @@ def algebra(function: F) -> F:
     """A helper for sums over rows: the compiler may reorder them, so they run several numbers at a time."""
     reorder = {"reassoc", "contract", "nsz"}
     return register_jitable(no_cpython_wrapper=True, fastmath=reorder, **OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def specialised(function: F) -> F:
+    """A helper in which the compiler decides ``if a is None``: what that leaves out costs nothing.
+
+    The condition must stand alone: with ``and`` beside it, it is not seen.
+    """
+    pruned = OPTIONS | {"no_rewrites": False}
+    return register_jitable(no_cpython_wrapper=True, **pruned)(function)  # type: ignore[no-any-return]
 
 
 def entry(function: F) -> F:

@@ -15,7 +15,7 @@ from sixpoint.jobs.solving import Solving, parse_solving, solve
 from sixpoint.samples import make_sample
 from sixpoint.solvers.base import Status
 
-SOLVING = ("method", "weights", "search", "rotations", "limits", "no_limits")
+SOLVING = ("method", "weights", "search", "rotations", "limits", "no_limits", "avoid")
 READING = ("unit", "up", "rate")
 BODY = ("skeleton", "stature", "mapping")
 

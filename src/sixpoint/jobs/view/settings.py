@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from sixpoint.body.targets import EFFECTORS
+from sixpoint.solvers.avoidance.options import AVOIDABLE
 from sixpoint.solvers.registry import find_options, find_solver
 from sixpoint.viewer.panel import Choice, Setting
 
@@ -19,8 +20,8 @@ FIXED = ("flext", "step")
 """Options by which methods of one class differ."""
 WEIGHTS = (("w1", "wrists"), ("w2", "ankles"), ("w3", "memory"))
 RANGES = {"damping": (0.01, 0.5), "reach": (0.02, 0.5), "twist_weight": (0.0, 5.0), "iterations": (1, 20)}
-TURN = "turn "
-"""Before an effector's name: whether its rotation is used."""
+TURN, AVOID = "turn ", "avoid "
+"""Before an effector: whether its rotation is used. Before a part: whether it stays out of the trunk."""
 
 
 def describe_settings(method: str, values: Mapping[str, Any]) -> list[Setting]:
@@ -49,8 +50,11 @@ def read_settings(method: str, values: Mapping[str, Any]) -> dict[str, Any]:
     turned = tuple(name for name in EFFECTORS if shown.get(TURN + name))
     if turned:
         options["rotations"] = turned
+    avoided = tuple(name for name in AVOIDABLE if shown.get(AVOID + name))
+    if avoided:
+        options["avoid"] = avoided
     for name, value in shown.items():
-        if not name.startswith(TURN) and name not in dict(WEIGHTS) and value != plain[name]:
+        if not name.startswith((TURN, AVOID)) and name not in dict(WEIGHTS) and value != plain[name]:
             options[name] = value
     return options
 
@@ -66,6 +70,9 @@ def _describe(name: str, parameter: inspect.Parameter) -> list[Setting]:
     if name == "rotations":
         hint = "Use its rotation too: its handle gets rings"
         return [Setting(TURN + at, at, False, None, hint, "Rotations") for at in EFFECTORS]
+    if name == "avoid":
+        hint = "Keep it out of the trunk"
+        return [Setting(AVOID + part, part, False, None, hint, "Out of the trunk") for part in AVOIDABLE]
     label = name.replace("_", " ")
     if isinstance(default, bool):
         return [Setting(name, label, default)]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.distance_grid import DistanceGrid
 from sixpoint.body.dofs import Ball, Hinges
 from sixpoint.errors import SixpointError
 from sixpoint.kernels import distance
@@ -23,6 +24,7 @@ from sixpoint.solvers.prioritized.tasks import (
     FlextTask,
     HalfSpace,
     LookAtTask,
+    Mesh,
     ObstacleTask,
     OrientationTask,
     PlaneTask,
@@ -53,6 +55,7 @@ class Block:
     index: NDArray[np.int64]
     values: Array
     level: int
+    grid: Array | None = None
 
 
 def _block(
@@ -139,12 +142,19 @@ def _avoidance(
     shape: Shape,
     margin: float,
     buffer: float,
+    on: str | None = None,
 ) -> Block:
     if not (0 <= margin < np.inf and 0 <= buffer < np.inf):
         raise SixpointError(f"{task.label}: margin and buffer are lengths from 0 [m]")
     number, size = _size(task, shape)
     step = _reach(body, joint, offset)
-    return _block(
+    carried: dict[str, int] = {}
+    if on is not None:
+        carrier, _ = body.place(on)
+        if carrier == joint:
+            raise SixpointError(f"{task.label}: a point of {on!r} is always where it is on {on!r}")
+        carried = {"root": carrier, "option": packing.CARRIED}
+    block = _block(
         kind,
         task,
         k,
@@ -157,7 +167,18 @@ def _avoidance(
         size=size,
         ratio=margin,
         buffer=buffer,
+        **carried,
     )
+    return replace(block, grid=pack_grid(shape.grid)) if isinstance(shape, Mesh) else block
+
+
+def pack_grid(grid: DistanceGrid) -> Array:
+    """A grid of distances as rows of four: origin and spacing, counts, values; see ``kernels.distance``."""
+    values = grid.values.ravel()
+    rows = np.zeros((2 + -(-len(values) // 4), 4))
+    rows[0], rows[1, :3] = (*grid.origin, grid.spacing), grid.values.shape
+    rows[2:].flat[: len(values)] = values
+    return rows
 
 
 def _size(task: Task, shape: Shape) -> tuple[int, Array]:
@@ -170,8 +191,10 @@ def _size(task: Task, shape: Shape) -> tuple[int, Array]:
             number, size = distance.BOX, [0.5 * side for side in sides]
         case HalfSpace():
             number, size = distance.HALF_SPACE, [0.0, 0.0, 0.0]
+        case Mesh():
+            number, size = distance.GRID, [0.0, 0.0, 0.0]
         case _:
-            raise SixpointError(f"{task.label}: a shape is a Sphere, Capsule, Box or HalfSpace")
+            raise SixpointError(f"{task.label}: a shape is a Sphere, Capsule, Box, HalfSpace or Mesh")
     array = np.asarray(size, float)
     if array.shape != (3,) or not np.all((array >= 0) & np.isfinite(array)):
         raise SixpointError(f"{task.label}: sizes of a shape are lengths from 0 [m], got {shape}")
@@ -181,7 +204,9 @@ def _size(task: Task, shape: Shape) -> tuple[int, Array]:
 def _obstacle(body: Articulation, task: ObstacleTask, k: int) -> list[Block]:
     points = body.points([(task.at, task.offset), *task.points])
     return [
-        _avoidance(body, packing.OBSTACLE, task, k, joint, offset, task.shape, task.margin, task.buffer)
+        _avoidance(
+            body, packing.OBSTACLE, task, k, joint, offset, task.shape, task.margin, task.buffer, task.on
+        )
         for joint, offset in points
     ]
 

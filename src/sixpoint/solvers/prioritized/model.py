@@ -61,10 +61,14 @@ def lower_blocks(
     blocks = sorted(blocks, key=lambda block: block.level)
     index = np.zeros((len(blocks), packing.BLOCK_INTEGERS), np.int64)
     values = np.zeros((len(blocks), packing.BLOCK_NUMBERS))
+    grids: list[Array] = []
     row = 0
     for b, block in enumerate(blocks):
         index[b], values[b] = block.index, block.values
         index[b, packing.LEVEL], index[b, packing.FIRST] = wanted.index(block.level), row
+        if block.grid is not None:
+            index[b, packing.MIDDLE] = sum(map(len, grids))
+            grids.append(block.grid)
         row += int(index[b, packing.COUNT])
     levels = np.zeros((len(wanted), 4))
     widest = 3
@@ -73,12 +77,12 @@ def lower_blocks(
         flext = np.any(index[inside, packing.KIND] == packing.FLEXT)
         levels[k, :3] = inside[0], len(inside), FLEXT_NORM if flext else POSITION_NORM
         widest = max(widest, int(index[inside, packing.COUNT].sum()))
-    model, balls = _lower_body(body, tasks, posture, levels)
+    model, balls = _lower_body(body, tasks, posture, levels, np.vstack([np.zeros((0, 4)), *grids]))
     return Lowered(model, balls, index, values, row, widest)
 
 
 def _lower_body(
-    body: Articulation, tasks: Sequence[Task], posture: PostureTask | None, levels: Array
+    body: Articulation, tasks: Sequence[Task], posture: PostureTask | None, levels: Array, grids: Array
 ) -> tuple[Model, Array]:
     joints = len(body.tree)
     column = 3 if body.dofs.free_root else 0
@@ -120,6 +124,7 @@ def _lower_body(
         bounds=bounds,
         levels=levels,
         points=offsets,
+        grids=grids,
         parent=np.array(body.tree.parents),
         kind=kind,
         start=start,

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
 from typing import ClassVar, Literal
 
 from numpy.typing import ArrayLike
 
+from sixpoint.body.distance_grid import DistanceGrid, build_grid
 from sixpoint.body.motion import Pose
 
 Vector = tuple[float, float, float]
@@ -138,7 +140,33 @@ class HalfSpace:
     """Everything below the plane through the goal's position, normal to its Y axis."""
 
 
-Shape = Sphere | Capsule | Box | HalfSpace
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed triangle mesh, placed and turned as the goal: an object of the scene.
+
+    Distances are interpolated on a grid that is made once; features smaller than its spacing are rounded.
+
+    Attributes:
+        vertices: (V, 3) [m].
+        triangles: (T, 3), counter-clockwise seen from outside.
+        spacing: Of the grid [m]; by default a 32nd of the longest side.
+    """
+
+    vertices: ArrayLike
+    triangles: ArrayLike
+    spacing: float | None = None
+
+    @cached_property
+    def grid(self) -> DistanceGrid:
+        """Signed distances around it.
+
+        Raises:
+            SixpointError: It is not closed.
+        """
+        return build_grid(self.vertices, self.triangles, self.spacing)
+
+
+Shape = Sphere | Capsule | Box | HalfSpace | Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +181,8 @@ class ObstacleTask(Task):
             are a good choice.
         margin: Distance kept to the shape [m]: the flesh around the point.
         buffer: Thickness of the zone in which approaches are slowed [m].
+        on: Place that carries the shape: a part of the body that the points stay out of. The goal is then
+            in that joint's frame (in a figure, its anatomical frame); by default the joint itself.
     """
 
     suffix: ClassVar[str] = "obstacle"
@@ -161,6 +191,11 @@ class ObstacleTask(Task):
     points: tuple[str | tuple[str, Vector], ...] = ()
     margin: float = 0.0
     buffer: float = 0.05
+    on: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.on is not None and self.goal is None:
+            object.__setattr__(self, "goal", FLOOR)
 
 
 @dataclass(frozen=True, eq=False)

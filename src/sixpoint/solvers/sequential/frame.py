@@ -7,7 +7,8 @@ from math import atan2, cos, sin
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
-from sixpoint.kernels.jit import entry, helper
+from sixpoint.kernels.jit import entry, helper, specialised
+from sixpoint.solvers.avoidance.elbow import clear_arm, make_arm
 from sixpoint.solvers.sequential import spine
 from sixpoint.solvers.sequential.clavicle import solve_clavicle
 from sixpoint.solvers.sequential.limb import solve_limb
@@ -169,9 +170,12 @@ def place_limb(model, limits, hold, limb, root, target, local, world, segs):
     )
 
 
-@helper
-def solve_frame(model, settings, points, local, memory, residual, scratch):
-    """Solve one frame; updates ``local``, ``memory``, ``residual`` (6,) [m] in place; returns the status."""
+@specialised
+def solve_frame(model, settings, points, flesh, local, memory, residual, scratch):
+    """Solve one frame; updates ``local``, ``memory``, ``residual`` (6,) [m] in place; returns the status.
+
+    ``flesh`` is what elbows stay out of, or None: the compiler then leaves that out.
+    """
     lost, root = pose_trunk(model, settings, points, local, memory, residual, scratch)
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     for limb in range(4):  # arms, then legs; neither depends on the other
@@ -183,8 +187,9 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
             model, settings.limits, settings.hold_clavicles, limb, root, target, local, world, segs
         )
         row = limb_row(segs.shape[0], limb)
+        aim = qt.inv_mul_vec(frame, vec.sub(target, place))
         upper, hinge, end = solve_limb(
-            qt.inv_mul_vec(frame, vec.sub(target, place)),
+            aim,
             model.limbs[limb, 0],
             model.limbs[limb, 1],
             -1.0 if limb < 2 else 1.0,
@@ -194,6 +199,10 @@ def solve_frame(model, settings, points, local, memory, residual, scratch):
             model.limbs[limb, 2],
             model.limbs[limb, 3],
         )
+        if flesh is not None:
+            if limb < 2:
+                arm = make_arm(model, limb, place, frame, aim, settings.limits)
+                upper, hinge, end = clear_arm(arm, flesh, root, world, segs, model.balls, upper, hinge, end)
         end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     return judge(lost, residual)
 
@@ -226,6 +235,6 @@ def solve_sequential(
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(model, settings, points[f], local, memory, residual[f], scratch)
+        outcome[f, 0] = solve_frame(model, settings, points[f], None, local, memory, residual[f], scratch)
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])

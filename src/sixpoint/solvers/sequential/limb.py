@@ -60,7 +60,7 @@ def solve_limb(target, l1, l2, h, limits, balls, ball, flexion_low, flexion_high
     flexion = 2.0 * atan2(bend_sin, bend_cos)
     if not changed and flexion_low <= flexion <= flexion_high:
         return root, hinge, vec.scale(d, u)
-    # Line 7, elbow-torso avoidance, belongs here.
+    # Line 7, elbow-torso avoidance, is in ``avoidance.elbow``: it needs the trunk.
     return close_on(limited, target, l1, l2, h, balls, ball, flexion_low, flexion_high)
 
 
@@ -71,11 +71,23 @@ def close_on(root, target, l1, l2, h, balls, ball, flexion_low, flexion_high):
     reach = vec.madd(target, l1, y)  # from the middle joint to the target; the segment runs along -y
     v = vec.reject(reach, y)
     if vec.norm(v) > 1e-6 * l2:
-        z = qt.z_axis(root)
-        aim = vec.scale(-h / vec.norm(v), v)
-        half = 0.5 * atan2(vec.dot(vec.cross(z, aim), y), vec.dot(z, aim))
-        root = qt.mul(root, (0.0, sin(half), 0.0, cos(half)))  # line 9
+        root = turn_about_itself(root, y, v, h)  # line 9
         root, _ = clamp(balls, ball, root)  # line 10
+    return fold(root, reach, l1, l2, h, flexion_low, flexion_high)
+
+
+@helper
+def turn_about_itself(root, y, v, h):
+    """Turn an upper segment, along -y, so that the limb folds towards v, which is across it."""
+    z = qt.z_axis(root)
+    aim = vec.scale(-h / vec.norm(v), v)
+    half = 0.5 * atan2(vec.dot(vec.cross(z, aim), y), vec.dot(z, aim))
+    return qt.mul(root, (0.0, sin(half), 0.0, cos(half)))
+
+
+@helper
+def fold(root, reach, l1, l2, h, flexion_low, flexion_high):
+    """Flex towards ``reach``, from the middle joint to the target; returns root, hinge and end."""
     z, y = qt.z_axis(root), qt.y_axis(root)
     flexion = atan2(-h * vec.dot(reach, z), -vec.dot(reach, y))  # line 11
     flexion = min(max(flexion, flexion_low), flexion_high)  # line 12

@@ -6,15 +6,19 @@ Kinematics", Graphical Models 70 (2008) 87-104.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError
+from sixpoint.solvers.avoidance.options import check_avoid, find_flesh
+from sixpoint.solvers.sequential.clear import solve_sequential_clear
 from sixpoint.solvers.sequential.frame import solve_sequential
 from sixpoint.solvers.sequential.packing import work_rows
+from sixpoint.solvers.six_points.packing import Model
 from sixpoint.solvers.six_points.solver import WALKING, SixPointSolver
 
 Array = NDArray[np.float64]
@@ -33,6 +37,9 @@ class SequentialIK(SixPointSolver):
         clavicles: "neutral" starts the clavicle from rest in every frame; "hold" from the last frame.
         align_pelvis: Twist the trunk about the line pelvis-head after it is placed, so that the pelvis'
             X axis is as near as possible to its estimate (not in the paper).
+        avoid: "elbows" keeps elbows out of the trunk (the paper's section 8), by the figure's shape or,
+            without one, by elliptic cylinders; "forearms" also forearms and hands, out of trunk and head.
+            Wrists stay on their targets; nothing is avoided by default.
 
     Raises:
         SixpointError: An option has an impossible value.
@@ -49,13 +56,22 @@ class SequentialIK(SixPointSolver):
         search: Literal["exact", "literal"] = "exact",
         clavicles: Literal["neutral", "hold"] = "neutral",
         align_pelvis: bool = False,
+        avoid: Sequence[str] = (),
     ) -> None:
         if search not in ("exact", "literal"):
             raise SixpointError(f"search is 'exact' or 'literal', got {search!r}")
         if clavicles not in ("neutral", "hold"):
             raise SixpointError(f"clavicles is 'neutral' or 'hold', got {clavicles!r}")
+        self.avoid = check_avoid(avoid)
         super().__init__(figure, weights=weights, limits=limits)
         self._switches = (search == "literal", clavicles == "hold", bool(align_pelvis))
+
+    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+        flesh = find_flesh(self.figure, self.figure.spine_chain, self.avoid)
+        return (*super()._lower(model), *(() if flesh is None else (flesh,)))
+
+    def _entry_of(self, beside: tuple[Array, ...]) -> Callable[..., None]:
+        return solve_sequential_clear if self.avoid else type(self)._entry
 
     def _numbers(self) -> tuple[float, ...]:
         return self._switches

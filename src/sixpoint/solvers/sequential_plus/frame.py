@@ -7,8 +7,9 @@ posed pelvis may miss [m], row 8 its low-passed Y axis, row 9 its turn towards t
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
-from sixpoint.kernels.jit import entry, helper
+from sixpoint.kernels.jit import entry, helper, specialised
 from sixpoint.kernels.swing_twist import clamp
+from sixpoint.solvers.avoidance.elbow import clear_arm_steadily, make_arm
 from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
@@ -145,20 +146,27 @@ def pole_of_start(given, limb, n, frame):
     return vec.scale(-1.0 if limb < 2 else 1.0, vec.cross(n, x))
 
 
-@helper
-def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual):
-    """A limb whose middle joint points to ``pole``, and its extremity."""
+@specialised
+def pose_limb(
+    model, s, limb, target, frame, place, pole, turned, began, flesh, root, scratch, local, residual
+):
+    """A limb whose middle joint points to ``pole``, and its extremity.
+
+    ``flesh`` is what elbows stay out of, or None: the compiler then leaves that out.
+    """
     count = model.segments.shape[0]
     row = limb_row(count, limb)
+    aim = qt.inv_mul_vec(frame, vec.sub(target, place))
+    was, bent = qt.load(local, row), qt.load(local, row + 2)
     upper, hinge, end = solve_by_pole(
-        qt.inv_mul_vec(frame, vec.sub(target, place)),
+        aim,
         model.limbs[limb, 0],
         model.limbs[limb, 1],
         -1.0 if limb < 2 else 1.0,
         pole,
         began,
-        qt.load(local, row),
-        qt.load(local, row + 2),
+        was,
+        bent,
         s.swivel_lag,
         s.swivel_memory,
         s.swivel_speed,
@@ -169,14 +177,33 @@ def pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, 
         model.limbs[limb, 2],
         model.limbs[limb, 3],
     )
+    if flesh is not None:
+        if limb < 2:
+            arm = make_arm(model, limb, place, frame, aim, s.limits)
+            most = s.swivel_speed * s.dt
+            upper, hinge, end = clear_arm_steadily(
+                arm,
+                flesh,
+                root,
+                scratch.world,
+                scratch.segs,
+                model.balls,
+                upper,
+                hinge,
+                end,
+                began,
+                was,
+                bent,
+                most,
+            )
     end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
     if turned.shape[0] > 0:
         above = qt.mul(qt.mul(frame, upper), hinge)
         turn_end(end_row(count, limb + 1), above, turned, limb + 2, s.limits, model.balls, local)
 
 
-@helper
-def solve_frame(model, s, points, turned, local, memory, residual, scratch):
+@specialised
+def solve_frame(model, s, points, turned, flesh, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
@@ -191,12 +218,27 @@ def solve_frame(model, s, points, turned, local, memory, residual, scratch):
         frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         n = vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place)))
         pole = point_limb(s, limb, n, frame, turned)
-        pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
+        pose_limb(
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
+        )
     return judge(lost, residual)
 
 
-@helper
-def solve_frame_from(model, s, points, turned, given, local, memory, residual, scratch):
+@specialised
+def solve_frame_from(model, s, points, turned, given, flesh, local, memory, residual, scratch):
     """The same from a given pose, see ``start``."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
@@ -212,7 +254,22 @@ def solve_frame_from(model, s, points, turned, given, local, memory, residual, s
         target = vec.load(filled, limb + 2)
         frame, place = place_limb(model, s.limits, False, limb, root, target, local, world, segs)
         pole = pole_of_start(given, limb, vec.unit(qt.inv_mul_vec(frame, vec.sub(target, place))), frame)
-        pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
+        pose_limb(
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
+        )
     return judge(lost, residual)
 
 
@@ -242,7 +299,7 @@ def solve_plus(
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
-        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], local, memory, residual[f], scratch)
+        outcome[f, 0] = solve_frame(model, s, points[f], turned[f], None, local, memory, residual[f], scratch)
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])
 
@@ -272,7 +329,7 @@ def solve_from_start(
     local, memory = state[:rows], state[rows:]
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame_from(
-            model, s, points[f], turned[f], given[f], local, memory, residual[f], scratch
+            model, s, points[f], turned[f], given[f], None, local, memory, residual[f], scratch
         )
         outcome[f, 1] = 1
         write_frame(model, local, memory, rotations[f], pelvis[f])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from math import exp
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +14,10 @@ from sixpoint.body.figure import COINCIDENT, Figure, SpineChain
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.targets import EFFECTORS, Targets, as_points
 from sixpoint.errors import SixpointError, SkeletonError, TargetError, listed
+from sixpoint.solvers.avoidance.options import check_avoid, find_flesh
 from sixpoint.solvers.base import MotionSolution, Progress, Solution
 from sixpoint.solvers.sequential.packing import work_rows
+from sixpoint.solvers.sequential_plus.clear import solve_from_start_clear, solve_plus_clear
 from sixpoint.solvers.sequential_plus.frame import solve_from_start, solve_plus
 from sixpoint.solvers.sequential_plus.start import find_start
 from sixpoint.solvers.six_points.model import build_model
@@ -125,6 +127,9 @@ class SequentialIKPlus(SixPointSolver):
         rotations: Effectors, of ``EFFECTORS``, whose measured rotations are used (trackers with six degrees
             of freedom). They are met exactly where limits allow; wrists and ankles have none. In a frame
             without one the effector counts by its position alone.
+        avoid: "elbows" keeps elbows out of the trunk, by the figure's shape or, without one, by elliptic
+            cylinders; "forearms" also forearms and hands, out of trunk and head. Wrists stay on their targets
+            and swivel angles do not jump; nothing is avoided by default.
 
     Raises:
         SixpointError: A constant has an impossible value, or there is no such effector.
@@ -136,6 +141,7 @@ class SequentialIKPlus(SixPointSolver):
     """Whether ``solve`` and ``solve_frames`` take a pose to start from."""
 
     _entry: ClassVar[Callable[..., None]] = staticmethod(solve_plus)
+    _entry_clear: ClassVar[Callable[..., None]] = staticmethod(solve_plus_clear)
 
     def __init__(
         self,
@@ -144,6 +150,7 @@ class SequentialIKPlus(SixPointSolver):
         limits: bool = True,
         habits: Habits | None = None,
         rotations: Sequence[str] = (),
+        avoid: Sequence[str] = (),
     ) -> None:
         self.habits = habits or Habits()
         for field in fields(Habits):
@@ -155,6 +162,7 @@ class SequentialIKPlus(SixPointSolver):
         if not 0 <= h.head_hold <= 1:
             raise SixpointError(f"head_hold is a share from 0 to 1, got {h.head_hold}")
         self.rotations = check_effectors(rotations)
+        self.avoid = check_avoid(avoid)
         super().__init__(figure, weights=WALKING, limits=limits)
 
     def solve(
@@ -223,7 +231,9 @@ class SequentialIKPlus(SixPointSolver):
         return turned, find_start(self.figure, chain, start, len(targets))
 
     def _entry_of(self, beside: tuple[Array, ...]) -> Callable[..., None]:
-        return type(self)._entry if len(beside) == 1 else solve_from_start
+        if len(beside) == 1:
+            return type(self)._entry_clear if self.avoid else type(self)._entry
+        return solve_from_start_clear if self.avoid else solve_from_start
 
     def _find_rotations(self, targets: Targets) -> Array:
         if targets.rotations is None:
@@ -259,6 +269,15 @@ class SequentialIKPlus(SixPointSolver):
     def _build_model(self) -> Model:
         chain = SpineChain.from_figure(self.figure, own_pelvis=True)
         return build_model(self.figure, chain, ends=bool(self.rotations))
+
+    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+        return (*super()._lower(model), *self._find_flesh())
+
+    def _find_flesh(self) -> tuple[Array, ...]:
+        """What the arms stay out of, the last of the fixed arrays; none where nothing is avoided."""
+        chain = SpineChain.from_figure(self.figure, own_pelvis=True)
+        flesh = find_flesh(self.figure, chain, self.avoid)
+        return () if flesh is None else (flesh,)
 
     def _make_work(self) -> tuple[Array, ...]:
         return (np.empty((work_rows(self._trunk), 4)),)

@@ -10,7 +10,7 @@ from math import exp
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
-from sixpoint.kernels.jit import entry, helper
+from sixpoint.kernels.jit import entry, helper, specialised
 from sixpoint.kernels.swing_twist import clamp
 from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
@@ -176,8 +176,10 @@ def wish_pole(model, limb, gap, base, places, turns, turned, features):
     return qt.mul_vec(base, vec.unit(pole))
 
 
-@helper
-def solve_frame(model, s, facts, places, turns, points, turned, local, memory, residual, scratch, thought):
+@specialised
+def solve_frame(
+    model, s, facts, places, turns, points, turned, flesh, local, memory, residual, scratch, thought
+):
     """Solve one frame; ``places`` and ``turns`` are the priors without and with a measured pelvis."""
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     began = memory[4, 0] > 0.0
@@ -198,7 +200,22 @@ def solve_frame(model, s, facts, places, turns, points, turned, local, memory, r
         base = qt.load(world, model.chest[limb] if limb < 2 else 0)
         wish = wish_pole(model, limb, gap, base, places, turns, turned, thought.features)
         pole = vec.add(vec.scale(1.0 - trust, plain), vec.scale(trust, qt.inv_mul_vec(frame, wish)))
-        pose_limb(model, s, limb, target, frame, place, pole, turned, began, local, residual)
+        pose_limb(
+            model,
+            s,
+            limb,
+            target,
+            frame,
+            place,
+            pole,
+            turned,
+            began,
+            flesh,
+            root,
+            scratch,
+            local,
+            residual,
+        )
     return judge(lost, residual)
 
 
@@ -242,6 +259,7 @@ def solve_prior(
             by_turns,
             points[f],
             turned[f],
+            None,
             local,
             memory,
             residual[f],

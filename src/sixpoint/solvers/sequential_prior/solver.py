@@ -17,6 +17,7 @@ from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.sequential_plus.solver import Habits, SequentialIKPlus
+from sixpoint.solvers.sequential_prior.clear import solve_prior_clear
 from sixpoint.solvers.sequential_prior.frame import solve_prior
 from sixpoint.solvers.sequential_prior.packing import (
     END,
@@ -34,6 +35,7 @@ from sixpoint.solvers.sequential_prior.packing import (
 )
 from sixpoint.solvers.six_points.model import build_model
 from sixpoint.solvers.six_points.packing import Model
+from sixpoint.solvers.six_points.solver import SixPointSolver
 
 Array = NDArray[np.float64]
 
@@ -54,6 +56,7 @@ class SequentialIKPrior(SequentialIKPlus):
         habits: Constants of SIK+: of the frame of reference, and of what is left to SIK+.
         rotations: Effectors whose measured rotations are used, see ``SequentialIKPlus``. The prior that was
             fitted with rotations is used where that of the pelvis is among them.
+        avoid: What arms stay out of, see ``SequentialIKPlus``.
         prior: File of a prior of your own (``sixpoint study prior``); the shipped one by default.
 
     Raises:
@@ -65,6 +68,7 @@ class SequentialIKPrior(SequentialIKPlus):
     takes_start = False
 
     _entry = staticmethod(solve_prior)
+    _entry_clear = staticmethod(solve_prior_clear)
 
     def __init__(
         self,
@@ -73,13 +77,15 @@ class SequentialIKPrior(SequentialIKPlus):
         limits: bool = True,
         habits: Habits | None = None,
         rotations: Sequence[str] = (),
+        avoid: Sequence[str] = (),
         prior: Path | str | None = None,
     ) -> None:
         self._networks = read_prior(None if prior is None else Path(prior))
-        super().__init__(figure, limits=limits, habits=habits, rotations=rotations)
+        super().__init__(figure, limits=limits, habits=habits, rotations=rotations, avoid=avoid)
 
     def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
-        return (*super()._lower(model), pack_facts(self._find_facts(model)), *self._networks)
+        plain = SixPointSolver._lower(self, model)
+        return (*plain, pack_facts(self._find_facts(model)), *self._networks, *self._find_flesh())
 
     def _beside(self, targets: Targets, start: Motion | Array | None = None) -> tuple[Array, ...]:
         if start is not None:

@@ -41,6 +41,7 @@ BLOCK_NUMBERS = 18
 
 # FLEXT's option bits.
 EXPONENTIAL, PREDICT, HINGE_ONLY, SECANT, FOLLOW, YIELD = 1, 2, 4, 8, 16, 32
+CARRIED = 1  # an obstacle's: its shape is on the joint ROOT
 
 
 class Model(NamedTuple):
@@ -59,6 +60,7 @@ class Model(NamedTuple):
         start: (J,) first column of each joint.
         size: (J,) columns of each joint.
         points: (P, 4) support points in their joints' frames [m].
+        grids: (G, 4) distances around meshes, see ``kernels.distance``; a block's MIDDLE is its first row.
         ball: (J,) row of each joint in the table of swing and twist limits, -1 for none.
         point_joints: (P,) joint of each support point.
         base: Joint whose position is the state's.
@@ -73,6 +75,7 @@ class Model(NamedTuple):
     bounds: np.ndarray
     levels: np.ndarray
     points: np.ndarray
+    grids: np.ndarray
     parent: np.ndarray
     kind: np.ndarray
     start: np.ndarray
@@ -88,9 +91,9 @@ HEADER = 7  # joints, columns, levels, points, base, free, rows of all tasks
 
 def pack_model(model):
     """Model -> table (N, 4) of all rows, and integers: sizes and indices."""
-    table = np.vstack([getattr(model, name) for name in Model._fields[:8]])
+    table = np.vstack([getattr(model, name) for name in Model._fields[:9]])
     sizes = [len(model.offsets), len(model.hinges), len(model.levels), len(model.points)]
-    parts = [getattr(model, name) for name in Model._fields[8:14]]
+    parts = [getattr(model, name) for name in Model._fields[9:15]]
     header = np.array([*sizes, model.base, int(model.free), 0])
     return table, np.concatenate([header, *parts]).astype(np.int64)
 
@@ -110,6 +113,7 @@ def unpack_model(table, integers):
         table[a:b],
         table[b : b + k],
         table[b + k : b + k + p],
+        table[b + k + p :],
         integers[h : h + j],
         integers[h + j : h + 2 * j],
         integers[h + 2 * j : h + 3 * j],

@@ -9,7 +9,7 @@ from math import atan2, pi, tan
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
-from sixpoint.kernels.distance import signed_distance
+from sixpoint.kernels.distance import GRID, grid_distance, signed_distance
 from sixpoint.kernels.jit import helper
 from sixpoint.kernels.linear import clear
 from sixpoint.solvers.prioritized.engine import packing
@@ -20,7 +20,7 @@ from sixpoint.solvers.prioritized.engine.kinematics import (
     place_of,
 )
 from sixpoint.solvers.prioritized.engine.limb_rows import build_drag, build_tangential
-from sixpoint.solvers.prioritized.engine.packing import FIRST, JOINT, KIND, ROOT
+from sixpoint.solvers.prioritized.engine.packing import FIRST, JOINT, KIND, MIDDLE, ROOT
 from sixpoint.solvers.prioritized.engine.support import compute_hull, inside_distance
 from sixpoint.solvers.prioritized.engine.wishes import (
     ENFORCED,
@@ -115,6 +115,29 @@ def build_directed(m, w, b, r, joint, point, axis, wanted, arm, gain, step, weig
 
 
 @helper
+def build_obstacle(m, w, index, values, b, goals, point, goal, gain):
+    """A point outside a shape, which stands in the world or is carried by another joint."""
+    r, t, root = index[b, FIRST], index[b, packing.TASK], index[b, ROOT]
+    weight, shape = values[b, packing.WEIGHT], index[b, packing.SHAPE]
+    carried = index[b, packing.OPTION] == packing.CARRIED
+    q = qt.normalised((goals[t, 3], goals[t, 4], goals[t, 5], goals[t, 6]))
+    if carried:
+        goal = place_of(m, w, root, goal)
+        q = qt.mul(qt.load(w.rotation, root), q)
+    inside = qt.inv_mul_vec(q, vec.sub(point, goal))
+    if shape == GRID:
+        found = grid_distance(m.grids, index[b, MIDDLE], inside)
+    else:
+        found = signed_distance(shape, triple(values, b, packing.SIZE), inside)
+    normal = vec.scale(weight, qt.mul_vec(q, (found[1], found[2], found[3])))
+    gap = found[0] - values[b, packing.RATIO]
+    build_unilateral(w, b, r, gap, gain, values[b, packing.STEP], weight)
+    add_row(m, w, r, index[b, JOINT], point, normal, NONE)
+    if carried:
+        add_row(m, w, r, root, point, vec.scale(-1.0, normal), NONE)
+
+
+@helper
 def build_block(m, w, index, values, b, goals, state, gain):
     """Error, wanted change and rows of one block (``FLEXT``: the error alone; see ``build_flext``)."""
     kind, r, t, joint = index[b, KIND], index[b, FIRST], index[b, packing.TASK], index[b, JOINT]
@@ -161,12 +184,7 @@ def build_block(m, w, index, values, b, goals, state, gain):
             return
         build_directed(m, w, b, r, joint, point, axis, wanted, arm, gain, step, weight)
     elif kind == packing.PLANE or kind == packing.OBSTACLE:
-        q = qt.normalised((goals[t, 3], goals[t, 4], goals[t, 5], goals[t, 6]))
-        inside = qt.inv_mul_vec(q, vec.sub(point, goal))
-        found = signed_distance(index[b, packing.SHAPE], triple(values, b, packing.SIZE), inside)
-        normal = qt.mul_vec(q, (found[1], found[2], found[3]))
-        build_unilateral(w, b, r, found[0] - values[b, packing.RATIO], gain, step, weight)
-        add_row(m, w, r, joint, point, vec.scale(weight, normal), NONE)
+        build_obstacle(m, w, index, values, b, goals, point, goal, gain)
     elif kind == packing.BALANCE:
         compute_masses(m, w)
         x, z = w.mass[0, 1] / w.mass[0, 0], w.mass[0, 3] / w.mass[0, 0]

@@ -1,0 +1,63 @@
+"""How the flesh of a figure crosses into compiled code: one array, a row per prism and one for the arms.
+
+A prism's row: x and z of its centre line, least and largest height, largest radius, outlines per metre, then
+the grown outlines (7, 33) as |x| + |z| of their points, see ``body.prisms.directions``; the last point is the
+first. The arms' row: number of balls, how far
+from the elbow the farthest is [m], then per ball 1 for the line elbow-wrist or 0 for elbow-shoulder, the
+share of it, and by how much the ball is smaller than the radius by which outlines are grown [m].
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sixpoint.body import prisms as outlines
+from sixpoint.kernels.jit import helper
+
+DIRECTIONS, SLICES = 32, 7  # written out: the cache of compiled code knows this file, not ``body``
+assert (DIRECTIONS, SLICES) == (outlines.DIRECTIONS, outlines.SLICES)
+HEADER = 6
+RING = DIRECTIONS + 1
+WIDTH = HEADER + SLICES * RING
+BALL = 3
+SPREAD, FIRST_BALL = 1, 2
+
+
+class Flesh(NamedTuple):
+    """The flesh as slices.
+
+    Attributes:
+        prisms: (P, W) rows of prisms; joint k of the trunk has row k.
+        arms: (W,) balls of an arm.
+    """
+
+    prisms: np.ndarray
+    arms: np.ndarray
+
+
+def pack_flesh(prisms, lengths, forearms):
+    """Flesh of a figure as an array (P + 1, W).
+
+    Args:
+        prisms: See ``body.prisms``.
+        lengths: Of upper arm and forearm [m].
+        forearms: Whether with the balls of the forearms.
+    """
+    norm = np.abs(outlines.directions()).sum(axis=1)
+    table = np.zeros((len(prisms.prisms) + 1, WIDTH))
+    for row, prism in zip(table, prisms.prisms, strict=False):
+        low, high = prism.heights[0], prism.heights[-1]
+        row[:HEADER] = *prism.centre, low, high, prism.grown.max(), (SLICES - 1) / max(high - low, 1e-9)
+        row[HEADER:] = np.pad(prism.grown * norm, ((0, 0), (0, 1)), mode="wrap").ravel()
+    balls = [*prisms.elbow, *(prisms.forearm if forearms else ())]
+    table[-1, :FIRST_BALL] = len(balls), max(ball.share * lengths[ball.forearm] for ball in balls)
+    numbers = [(ball.forearm, ball.share, prisms.radius - ball.radius) for ball in balls]
+    table[-1, FIRST_BALL : FIRST_BALL + BALL * len(balls)] = np.ravel(numbers)
+    return table
+
+
+@helper
+def unpack_flesh(table):
+    """The flesh as slices."""
+    last = table.shape[0] - 1
+    return Flesh(table[:last], table[last])
