@@ -7,7 +7,7 @@ import pytest
 
 import sixpoint as sp
 from body_rigs import family_skeleton
-from conftest import recordings
+from conftest import recordings, unmeasured
 from gltf_avatars import EXTENSIONS, make_avatar
 from sixpoint.body import rotations as rot
 from sixpoint.body.flesh import build_shape
@@ -174,6 +174,7 @@ def test_bones_without_a_mesh_cannot_be_drawn(folder, tmp_path, capsys):
         open_avatar(folder / "points.csv")
 
 
+@unmeasured
 @pytest.mark.parametrize("path", recordings("mesh/*.glb") + recordings("mesh/*.vrm"))
 def test_real_avatars_are_driven(path, folder, tmp_path):
     """Every avatar of the data folder takes the boxing motion: most targets are met, skin stays finite."""

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import recordings
+from conftest import recordings, unmeasured
 from marker_bodies import walking_markers
 from sixpoint.body.markers import Markers
 from sixpoint.body.motion import FileSpace
@@ -338,6 +338,7 @@ def test_damage_never_crashes(tmp_path_factory, sound, changes, cut):
             assert markers.positions.shape == (len(markers), len(markers.names), 3)
 
 
+@unmeasured
 @pytest.mark.parametrize("path", recordings("c3d/*.c3d"))
 def test_real_files_are_what_ezc3d_reads(path):
     """Names, rate, frames, gaps and positions of real recordings, against the independent reader."""
@@ -360,6 +361,7 @@ def test_real_files_are_what_ezc3d_reads(path):
     np.testing.assert_allclose(*lengths, atol=1e-9)
 
 
+@unmeasured
 def test_one_take_as_markers_and_as_skeleton(data):
     """CMU's 02_05 was exported twice: the C3D and the AMC have one rate and one length."""
     with warnings.catch_warnings():

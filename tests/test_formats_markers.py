@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import recordings
+from conftest import recordings, unmeasured
 from marker_bodies import walking_markers
 from sixpoint.body.markers import Markers
 from sixpoint.errors import FormatError
@@ -383,6 +383,7 @@ def test_damage_ends_in_markers_or_an_error(tmp_path_factory, sound, suffix, cha
         assert markers.positions.shape == (len(markers), len(markers.names), 3)
 
 
+@unmeasured
 @pytest.mark.parametrize("path", recordings("trc/*.trc"))
 def test_real_trc_files_are_what_numpy_reads(path):
     """Real recordings against genfromtxt: the same ways between markers, upright and of human size."""

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from conftest import unmeasured
 from sixpoint.body.anthropometry import segments_of_skeleton
 from sixpoint.body.figure import Figure
 from sixpoint.body.marker_model import MarkerModel
@@ -266,6 +267,7 @@ def test_exchanged_sides_are_reported():
 # --- recordings -----------------------------------------------------------------------------------
 
 
+@unmeasured
 def test_a_real_take_is_calibrated_from_its_markers(data):
     """CMU 02_05: markers within 2.5 cm of the model, and a person of human proportions."""
     from sixpoint.formats.markers import load_markers

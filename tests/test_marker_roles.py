@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import recordings
+from conftest import recordings, unmeasured
 from marker_bodies import misplaced_roles, walking_markers
 from sixpoint.body.marker_roles import _sets, find_marker_roles, segments_of_roles
 from sixpoint.errors import FormatError, TargetError
@@ -108,7 +108,7 @@ def test_twenty_four_markers_ship(labels):
     """The layout takes 24 roles of either set and nothing else."""
     found = find_marker_roles(["X:" + label for label in labels], "markers24")
     assert len(found.roles) == 24 and found.set_name == "24 markers"
-    assert {"l_asis", "r_psis", "c7", "l_wrist_ulnar", "r_toe"} <= set(found.labels)
+    assert {"l_asis", "l_psis", "c7", "l_acromion", "r_toe"} <= set(found.labels)
     assert len(found.unknown) == len(labels) - 24
 
 
@@ -161,6 +161,7 @@ def test_the_check_of_places_finds_exchanged_labels():
     assert misplaced_roles(WALK, {**roles, "l_knee_lateral": roles["l_ankle_lateral"]})
 
 
+@unmeasured
 @pytest.mark.parametrize("path", [*recordings("c3d/*.c3d"), *recordings("trc/*.trc")])
 def test_real_files_are_recognised_and_their_roles_are_where_they_belong(path):
     """Most labels have roles, left is on the left, and bones have the length of bones."""
