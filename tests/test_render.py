@@ -18,13 +18,14 @@ from sixpoint.jobs import render as job
 from sixpoint.render.camera import FIELD, Camera
 from sixpoint.render.colours import paint
 from sixpoint.render.encoding import find_codec, lay_out
-from sixpoint.render.light import of_hex, spread_over_sphere, to_linear, to_srgb
+from sixpoint.render.light import find_key, of_hex, spread_over_sphere, to_linear, to_srgb
 from sixpoint.render.surface import Surface
 
 pytest.importorskip("embreex", reason="pictures need the extra [render]")
 av = pytest.importorskip("av", reason="films need the extra [render]")
 Image = pytest.importorskip("PIL.Image", reason="pictures need the extra [render]")
 
+from sixpoint.render.picture import Body, _Shading  # noqa: E402
 from sixpoint.render.stage import Actor, Stage  # noqa: E402
 from sixpoint.render.tracing import Tracer  # noqa: E402
 
@@ -153,6 +154,22 @@ def test_pictures_are_deterministic(figure, boxing, stage):
     stage.take(20)
     again = Stage([actor_of(boxing, figure)], SIZE).take(7)
     np.testing.assert_array_equal(stage.take(7), again)
+
+
+def test_soft_shadows_have_no_dots():
+    """In a half shadow, light goes evenly from dark to bright: neighbours differ as those next but one do."""
+    square = np.array([[-1.0, 0, -1], [-1, 0, 1], [1, 0, 1], [1, 0, -1]])
+    roof = square * [0.35, 0.0, 0.35] + [-0.3, 0.8, 0.5]
+    vertices = np.concatenate([square, roof]).astype(np.float32)
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    up = np.tile(np.float32([0, 1, 0]), (8, 1))
+    body = Body(vertices, up, triangles, np.full((8, 3), 0.5, np.float32))
+    camera = Camera.framing(square, 0.3, 0.5, (240, 160))
+    light = _Shading(body, camera, find_key(camera.axes[0], camera.axes[2])).run()[0][..., 1]
+    inner = light[50:90, 60:180]
+    assert inner.max() > 1.5 * inner.min()  # there is a shadow
+    dots = inner[:, 1:-1] - (inner[:, :-2] + inner[:, 2:]) / 2
+    assert np.abs(dots).max() < 0.05 * np.ptp(inner)
 
 
 @pytest.mark.parametrize("view", ["front", "three-quarter", "side", "back"])

@@ -20,7 +20,8 @@ Index = NDArray[np.int64]
 SAMPLES = np.array([[0.375, 0.125], [0.875, 0.375], [0.625, 0.875], [0.125, 0.625]])
 """Within a pixel: a rotated grid, which smooths edges near the horizontal and the vertical best."""
 PATTERNS = 4 * len(SAMPLES)
-"""Of directions to the key light: one for each sample of two by two pixels, so that shadows have no steps."""
+"""Of directions to the key light: one for each sample of two by two pixels, so that shadows have no steps; what
+then repeats every second pixel, ``_blur`` takes out."""
 KEY_RAYS = 2  # per sample
 LIFT = 0.0015  # rays start this far off the surface [m]
 GLOSS, SHARPNESS = 0.05, 28.0
@@ -89,20 +90,34 @@ class _Shading:
         x1, y1 = np.clip(np.ceil(seen.max(axis=0)).astype(int) + 1, 0, [width, tall])
         if x0 >= x1 or y0 >= y1:
             return light, cover
+        part = np.s_[y0:y1, x0:x1]
         columns, rows = (grid.ravel() for grid in np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)))
+        key = np.zeros((y1 - y0, x1 - x0, 3), np.float32)  # as if nothing were in its way
+        clear, facing = np.zeros(key.shape[:2], np.float32), np.zeros(key.shape[:2], np.float32)
         for number, (dx, dy) in enumerate(SAMPLES):
             rays = self.camera.cast(columns + dx, rows + dy)
             origins = np.broadcast_to(self.eye, rays.shape).copy()
             hits = self.tracer.find_nearest(origins, rays)
             y, x = rows[hits.rays], columns[hits.rays]
-            light[y, x] += self._shade(hits, rays[hits.rays], number + len(SAMPLES) * (x % 2 + 2 * (y % 2)))
+            pattern = number + len(SAMPLES) * (x % 2 + 2 * (y % 2))
+            around, straight, lit, share = self._shade(hits, rays[hits.rays], pattern)
+            light[y, x] += around
             cover[y, x] += 1.0
+            key[y - y0, x - x0] += straight
+            facing[y - y0, x - x0] += lit
+            clear[y - y0, x - x0] += share
+        light[part] += key * (_blur(clear) / np.maximum(_blur(facing), 1e-6))[..., None]
         light /= len(SAMPLES)
         cover /= len(SAMPLES)
         return light, cover
 
-    def _shade(self, hits: Hits, rays: Floats, patterns: Index) -> Floats:
-        """Light (n, 3) that hits send back along their rays; ``patterns`` (n,) of directions to the key."""
+    def _shade(self, hits: Hits, rays: Floats, patterns: Index) -> tuple[Floats, Floats, Floats, Floats]:
+        """What hits send back along their rays; ``patterns`` (n,) of directions to the key light.
+
+        Returns:
+            Light (n, 3) of the sky and (n, 3) of the key light, were nothing in its way; 1 (n,) where the
+            surface faces the key light; the share (n,) of its disc that is seen from there.
+        """
         body = self.body
         corners = body.triangles[hits.triangles]
         points = self.eye + hits.distances[:, None] * rays
@@ -116,27 +131,32 @@ class _Shading:
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
         colours = np.einsum("nkc,nk->nc", body.colours[corners], hits.shares)
         starts = _smooth_starts(points, normals, flat, body, corners, hits.shares, behind)
-        light = np.einsum("nkc,nk->nc", self.sky[corners], hits.shares)
-        key, gloss = self._key(starts, normals, rays, patterns)
-        return np.asarray(colours * (light + key[:, None] * KEY.astype(np.float32)) + gloss[:, None])
+        around = colours * np.einsum("nkc,nk->nc", self.sky[corners], hits.shares)
+        lean = (normals @ self.key.astype(np.float32)).clip(0.0)
+        half = self.key.astype(np.float32) - rays
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        gloss = GLOSS * np.einsum("nc,nc->n", half, normals).clip(0.0) ** SHARPNESS * (lean > 0.0)
+        straight = colours * lean[:, None] * KEY.astype(np.float32) + gloss[:, None]
+        facing = (lean > 0.0).astype(np.float32)
+        return around, straight, facing, self._clear(starts, lean > 0.0, patterns)
 
-    def _key(self, starts: Floats, normals: Floats, rays: Floats, patterns: Index) -> tuple[Floats, Floats]:
-        """Key light (n,) and its gloss (n,)."""
-        lit = np.zeros(len(starts), np.float32)
-        gloss = np.zeros(len(starts), np.float32)
+    def _clear(self, starts: Floats, facing: NDArray[np.bool_], patterns: Index) -> Floats:
+        """Share (n,) of the key light's disc that is seen; none where the surface does not face it."""
+        share = np.zeros(len(starts), np.float32)
         disc = spread_over_disc(self.key, KEY_RAYS * PATTERNS, 0.5)
-        lean = normals @ self.key.astype(np.float32)
         for pattern in np.unique(patterns):
-            facing = np.flatnonzero((patterns == pattern) & (lean > 0.0))
+            some = np.flatnonzero((patterns == pattern) & facing)
             for ray in disc[pattern::PATTERNS]:
-                blocked = self.tracer.find_blocked(starts[facing], np.tile(ray, (len(facing), 1)))
-                clear = facing[~blocked]
-                lit[clear] += lean[clear] / KEY_RAYS
-                half = ray - rays[clear]
-                half /= np.linalg.norm(half, axis=1, keepdims=True)
-                sheen = np.einsum("nc,nc->n", half, normals[clear]).clip(0.0) ** SHARPNESS
-                gloss[clear] += GLOSS * sheen / KEY_RAYS
-        return lit, gloss
+                blocked = self.tracer.find_blocked(starts[some], np.tile(ray, (len(some), 1)))
+                share[some[~blocked]] += 1.0 / KEY_RAYS
+        return share
+
+
+def _blur(values: Floats) -> Floats:
+    """Mean over three by three pixels with weights 1 2 1 either way: constant for what has a period of two."""
+    around = np.pad(values, 1)
+    rows = around[:-2] + 2.0 * around[1:-1] + around[2:]
+    return np.asarray((rows[:, :-2] + 2.0 * rows[:, 1:-1] + rows[:, 2:]) / 16.0)
 
 
 def _smooth_starts(
