@@ -20,8 +20,8 @@ Index = NDArray[np.int64]
 SAMPLES = np.array([[0.375, 0.125], [0.875, 0.375], [0.625, 0.875], [0.125, 0.625]])
 """Within a pixel: a rotated grid, which smooths edges near the horizontal and the vertical best."""
 PATTERNS = 4 * len(SAMPLES)
-"""Of directions to the key light: one for each sample of two by two pixels, so that shadows have no steps; what
-then repeats every second pixel, ``_blur`` takes out."""
+"""Of directions to the key light: one for each sample of two by two pixels, so that shadows have no steps;
+what then repeats every second pixel, ``_blur`` takes out."""
 KEY_RAYS = 2  # per sample
 LIFT = 0.0015  # rays start this far off the surface [m]
 GLOSS, SHARPNESS = 0.05, 28.0
@@ -153,7 +153,7 @@ class _Shading:
 
 
 def _blur(values: Floats) -> Floats:
-    """Mean over three by three pixels with weights 1 2 1 either way: constant for what has a period of two."""
+    """Mean over three by three pixels with weights 1 2 1 either way: what has a period of two is gone."""
     around = np.pad(values, 1)
     rows = around[:-2] + 2.0 * around[1:-1] + around[2:]
     return np.asarray((rows[:, :-2] + 2.0 * rows[:, 1:-1] + rows[:, 2:]) / 16.0)
