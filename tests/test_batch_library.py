@@ -50,6 +50,18 @@ def test_a_pattern_may_be_relative_or_of_the_home(library, monkeypatch):
         assert all(path.is_absolute() for path in find_files([pattern], KINDS, Path("out")).files)
 
 
+def test_names_with_brackets_are_names_before_they_are_patterns(tmp_path, monkeypatch):
+    """A folder that is called ``take [1]`` may be the current one, or stand in a pattern."""
+    folder = tmp_path / "take [1]"
+    (folder / "a").mkdir(parents=True)
+    (folder / "a" / "x.bvh").touch()
+    monkeypatch.chdir(folder)
+    for pattern in ("a/*.bvh", "../take [1]/**/*.bvh", str(folder / "*" / "x.*")):
+        assert [file.name for file in find_files([pattern], KINDS, tmp_path / "out").files] == ["x.bvh"]
+    with pytest.raises(sp.SixpointError, match="empty"):
+        find_files([""], KINDS, tmp_path / "out")
+
+
 def test_a_file_is_taken_once(library):
     """Two patterns, and links to files and folders, lead to one task; which is said."""
     (library / "18" / "again.amc").symlink_to(library / "17" / "a.amc")

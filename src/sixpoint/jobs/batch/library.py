@@ -60,7 +60,8 @@ def find_files(patterns: Sequence[str], suffixes: Sequence[str], out: Path) -> L
     patterns and links lead to it.
 
     Args:
-        patterns: As of a shell; ``**`` is any number of folders.
+        patterns: As of a shell; ``**`` is any number of folders. A file or folder that is there by that very
+            name, brackets and all, is meant itself.
         suffixes: Of files that the job reads.
         out: The folder to write into.
 
@@ -108,6 +109,8 @@ def find_files(patterns: Sequence[str], suffixes: Sequence[str], out: Path) -> L
 
 def _expand(pattern: str, suffixes: Sequence[str]) -> tuple[Path, list[Path]]:
     """The folder that a pattern searches, and the files it names; absolute."""
+    if not pattern:
+        raise SixpointError("a pattern is empty: give files, or . for all below this folder")
     path = Path(os.path.abspath(Path(pattern).expanduser()))  # noqa: PTH100  links stay: they are the names
     if path.is_file():
         if path.suffix.lower() not in suffixes:
@@ -120,11 +123,13 @@ def _expand(pattern: str, suffixes: Sequence[str]) -> tuple[Path, list[Path]]:
         if not files:
             raise FormatError(path, f"no file that this job reads ({listed(suffixes)}): {_contents(path)}")
         return path, files
-    wild = next((k for k, part in enumerate(path.parts) if WILD.search(part)), None)
-    if wild is None:
+    parts = path.parts
+    wild = [k for k, part in enumerate(parts) if WILD.search(part) and not Path(*parts[: k + 1]).exists()]
+    if not wild:
         raise FormatError(path, "there is no such file or folder")
-    base = Path(*path.parts[:wild])
-    files = [Path(name) for name in glob.iglob(str(path), recursive=True)]  # noqa: PTH207  hidden ones are left out
+    base, rest = Path(*parts[: wild[0]]), Path(*parts[wild[0] :])
+    names = glob.iglob(f"{glob.escape(str(base))}/{rest}", recursive=True)  # noqa: PTH207  hidden ones are left out
+    files = [Path(name) for name in names]
     files = [file for file in files if file.is_file()]
     if not files:
         raise SixpointError(f"no file matches {pattern!r}: searched {base}, {_contents(base)}")
