@@ -164,9 +164,13 @@ def test_another_version_is_refused(here, scheduler, start_worker, tmp_path, cap
 def test_no_scheduler_is_said(here, capsys, monkeypatch):
     """An address where nothing answers is an error after a while, with what to start."""
     monkeypatch.setattr(cluster, "CONNECT", 0.5)
-    for address in ("tcp://127.0.0.1:1", "nonsense"):
+    said = {
+        "tcp://127.0.0.1:1": "no Dask scheduler answers at tcp://127.0.0.1:1",
+        "nonsense": "is tcp://host:port",
+    }
+    for address, message in said.items():
         assert main(["batch", "library", "-o", "none", "--scheduler", address]) == 2
-        assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
+        assert message in capsys.readouterr().err
 
 
 def test_no_workers_is_said(here, scheduler, capsys, monkeypatch):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import secrets
 import socket
 import time
@@ -31,6 +32,7 @@ CONNECT, GATHER, ALONE = 10.0, 20.0, 30.0
 POLL = 0.05
 LOST = "the Dask scheduler was lost"
 PROBE = f"{OURS}/probe.txt"
+ADDRESS = re.compile(r"(\w+://)?\S+:\d+")
 
 
 def run_on_cluster(
@@ -62,6 +64,8 @@ def run_on_cluster(
         from distributed import Client
     except ImportError as error:
         raise SixpointError('--scheduler needs Dask: pip install "sixpoint[cluster]"') from error
+    if not ADDRESS.fullmatch(address):
+        raise SixpointError(f"the address of a Dask scheduler is tcp://host:port, got {address!r}")
     client = None
     try:
         _quieten()
