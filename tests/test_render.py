@@ -358,6 +358,7 @@ def test_a_single_frame_is_a_picture_without_a_label(file, tmp_path):
         (["-o", "boxing.mp4", "--size", "81x96"], "even in both"),
         (["-o", "a.png", "--size", "8x9"], "16 to 4096"),
         (["-o", "a.png", "--size", "large"], "640x720"),
+        (["-o", "a.png", "--size", "4096x4096", "--pictures", "30"], "too much for a sheet"),
         (["-o", "a.png", "--colours", "pink"], "sides, clay"),
         (["-o", "a.png", "--fps", "0"], "0.1 to 240"),
         (["-o", "a.png", "--pictures", "0"], "at least one"),

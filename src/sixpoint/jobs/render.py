@@ -28,6 +28,8 @@ from sixpoint.render.tracing import check_libraries
 
 FILM, SHEET = ".mp4", ".png"
 SMALLEST, LARGEST = 16, 4096
+SHEET_PIXELS = 200_000_000
+"""A larger contact sheet is taken for a slip: it is held in memory, and few programs open it."""
 NAMED = "frame_{:04d}.png"
 
 
@@ -148,6 +150,12 @@ def draw(
     stage = Stage(actors, look.size, look.view, look.follow)
     motion = actors[0].motion
     frames = _choose_frames(motion, look, out.suffix.lower() == SHEET)
+    pixels = len(frames) * look.size[0] * look.size[1]
+    if out.suffix.lower() == SHEET and pixels > SHEET_PIXELS:
+        raise SixpointError(
+            f"{len(frames)} pictures of {look.size[0]}x{look.size[1]} are too much for a sheet: "
+            "fewer or smaller ones, or a folder of frames (-o without a suffix)"
+        )
     start = time.perf_counter()
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
