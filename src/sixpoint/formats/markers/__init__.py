@@ -66,7 +66,8 @@ def load_markers(
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise FormatError(path, f"a {path.suffix} file holds no markers; formats: {listed(MARKER_SUFFIXES)}")
+        kind = f"a {path.suffix} file holds no markers" if path.suffix else "a file of markers has a suffix"
+        raise FormatError(path, f"{kind}; formats: {listed(MARKER_SUFFIXES)}")
     if rate is not None and not 1e-3 <= rate <= 1e6:
         raise FormatError(path, f"the rate is frames per second, 0.001 to 1000000, got {rate}")
     raw = reader(path)
