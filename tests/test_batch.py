@@ -114,7 +114,11 @@ def test_interrupted_it_goes_on(library, capsys):
     command = [sys.executable, "-m", "sixpoint", "batch", *words]
     source = str(Path(sp.__file__).parents[1])
     process = subprocess.Popen(
-        command, env={**os.environ, "PYTHONPATH": source}, stderr=subprocess.PIPE, start_new_session=True
+        command,
+        env={**os.environ, "PYTHONPATH": source},
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in a shell's background
     )
     deadline = time.monotonic() + 60
     while len(records(Path("out"))) < 2 and time.monotonic() < deadline:
