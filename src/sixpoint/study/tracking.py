@@ -98,19 +98,20 @@ def draw_residuals(
     bars.grid(axis="y", visible=False)
     bars.tick_params(labelsize=7.5)
     bars.set_ylim(-0.7, len(rows) - 0.3)
-    axes = canvas.add_axes((0.06, 0.55 / height, 0.92, 1.6 / height))
-    times = np.arange(len(residual)) / rate
     used = (flags == USED) | (flags == SWAPPED)
+    lost = 1.0 - used.mean(axis=1)
+    room = 0.055 if lost.max(initial=0.0) > 0 else 0.0  # for the axis at the right
+    axes = canvas.add_axes((0.06, 0.55 / height, 0.92 - room, 1.6 / height))
+    times = np.arange(len(residual)) / rate
     count = np.maximum(used.sum(axis=1), 1)
     rms = 100 * np.sqrt(np.where(used, residual**2, 0.0).sum(axis=1) / count)
     axes.fill_between(times, rms, color=LEFT, alpha=0.13, lw=0)
     axes.plot(times, rms, color=LEFT, lw=1.4)
-    lost = 1.0 - used.mean(axis=1)
-    if lost.max() > 0:
+    if room:
         twin = axes.twinx()
         twin.fill_between(times, 100 * lost, color=RIGHT, alpha=0.25, lw=0, step="mid")
         twin.set_ylim(0, 100)
-        twin.set_ylabel("not used [%]", color=SOFT, size=9.5)
+        twin.set_ylabel("not used [%]", color=RIGHT, size=9.5)
         twin.tick_params(colors=SOFT, labelsize=9, length=0)
         twin.spines[:].set_visible(False)
     axes.set_ylim(0, max(1.15 * rms.max(), 0.1))
