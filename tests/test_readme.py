@@ -12,6 +12,7 @@ import sixpoint as sp
 from gltf_avatars import make_avatar
 from marker_bodies import walking_markers
 from sixpoint.cli import main
+from sixpoint.formats import save_markers
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -42,6 +43,21 @@ def test_python_of_the_docs_runs(capsys):
     for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
         exec(compile(block, "prioritized.md", "exec"), names)
     assert capsys.readouterr().out.count("CONVERGED") == 2
+
+
+@pytest.mark.parametrize("name", ["render", "retargeting", "track", "markers"])
+def test_python_of_other_docs_runs(name, tmp_path, monkeypatch):
+    """The Python of a page runs as it stands, in order, with files of the names it uses."""
+    monkeypatch.chdir(tmp_path)
+    figure = sp.Figure.from_stature(1.75)
+    sp.save_targets(figure.targets(sp.make_sample("walk", figure).sliced(slice(0, 30))), "points.csv")
+    save_markers(walking_markers(30), Path("gait.c3d"))
+    names: dict[str, object] = {}
+    text = (ROOT / "docs" / f"{name}.md").read_text("utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, f"{name}.md", "exec"), names)
 
 
 COMMANDS = [

@@ -36,6 +36,8 @@ def check_writable(paths: Iterable[Path], force: bool) -> None:
                 raise FormatError(path, "this is a folder; give a file name")
             if not path.parent.is_dir():
                 raise FormatError(path, f"the folder {path.parent} does not exist; create it first")
+            if not os.access(path.parent, os.W_OK):
+                raise FormatError(path, f"the folder {path.parent} may not be written to")
             if not force and (path.exists() or path.is_symlink()):
                 raise FormatError(path, "exists; use --force / force=True to overwrite it")
         except (OSError, ValueError) as error:
