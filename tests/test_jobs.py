@@ -69,6 +69,13 @@ def test_output_is_checked_before_files_are_read(tmp_path):
         reconstruct(tmp_path / "absent.bvh", tmp_path / "none" / "x.bvh")
 
 
+def test_a_folder_without_permission_is_found_before_the_work(tmp_path, monkeypatch):
+    """Where nothing may be written is said before anything is read or solved."""
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path) != tmp_path)
+    with pytest.raises(sp.FormatError, match="may not be written to"):
+        reconstruct(tmp_path / "absent.bvh", tmp_path / "x.bvh")
+
+
 def test_output_lists_all_files(tmp_path):
     """An AMC has an ASF, and an existing ASF is not overwritten."""
     out = tmp_path / "x.amc"
