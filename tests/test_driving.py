@@ -8,7 +8,7 @@ import pytest
 import sixpoint as sp
 from body_rigs import family_skeleton
 from conftest import recordings, unmeasured
-from gltf_avatars import EXTENSIONS, make_avatar
+from gltf_avatars import EXTENSIONS, PLACES, make_avatar
 from sixpoint.body import rotations as rot
 from sixpoint.body.flesh import build_shape
 from sixpoint.cli import main
@@ -142,6 +142,14 @@ def test_what_an_avatar_cannot_be_given_is_said(folder, monkeypatch, capsys, wor
     assert main(["reconstruct", *words]) == 2
     assert message in capsys.readouterr().err
     assert {p: p.stat().st_mtime_ns for p in folder.iterdir()} == before
+
+
+def test_an_avatar_without_size_is_named(folder, tmp_path, monkeypatch):
+    """A body of a millimetre, as of a wrong unit, is an error that says which file it is in."""
+    monkeypatch.setattr("gltf_avatars.PLACES", PLACES * 1e-3)
+    (tmp_path / "tiny.vrm").write_bytes(make_avatar("vrm1"))
+    with pytest.raises(FormatError, match=r"tiny\.vrm: .*no length"):
+        open_avatar(tmp_path / "tiny.vrm")
 
 
 def test_an_avatar_is_drawn_in_its_own_colours_and_size(folder, tmp_path):

@@ -10,9 +10,11 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
 from sixpoint.body.retargeting import Mode
+from sixpoint.body.spine_chain import SpineChain
 from sixpoint.body.targets import Targets
-from sixpoint.errors import FormatError, listed
+from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import GLTF_SUFFIXES, Avatar, load_avatar
+from sixpoint.formats.suffixes import with_path
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.retarget import retarget
 from sixpoint.jobs.solving import Solved, Solving, solve
@@ -35,7 +37,12 @@ def open_avatar(path: Path, mapping: Path | None = None, limits: Limits | None =
     """
     if path.suffix.lower() not in AVATARS:
         raise FormatError(path, f"an avatar is one of {listed(AVATARS)}")
-    return load_avatar(path, mapping, limits)
+    avatar = load_avatar(path, mapping, limits)
+    try:
+        SpineChain.from_figure(avatar.figure)
+    except SixpointError as error:
+        raise with_path(path, error) from None
+    return avatar
 
 
 def is_on(motion: Motion, figure: Figure) -> bool:
