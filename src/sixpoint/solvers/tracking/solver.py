@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sixpoint.body.dofs import Dofs
 from sixpoint.body.figure import Figure
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.motion import Motion, Pose
@@ -90,6 +91,7 @@ class MarkerTracker:
         damping: Lever below which a turn is damped [m].
         tolerances: Part -> how far the centre of its markers may be off before it is held there, whatever
             that costs the parts below [m]; 2 cm by default. Within it all markers count alike.
+        dofs: What may move and how far; by default ``figure.full_dofs()``. See ``widen_limits``.
 
     Raises:
         SixpointError: An option makes no sense; the message says what would.
@@ -106,6 +108,7 @@ class MarkerTracker:
         gate: float = 0.04,
         damping: float = 0.05,
         tolerances: Mapping[str, float] | None = None,
+        dofs: Dofs | None = None,
     ) -> None:
         if not (int(iterations) == iterations and iterations >= 1):
             raise SixpointError(f"iterations are a whole number from 1, got {iterations}")
@@ -113,14 +116,14 @@ class MarkerTracker:
             if not value > 0:
                 raise SixpointError(f"the {name} is a positive number [m], got {value}")
         self.model = model
-        self.body = Articulation.of(model.figure, model.figure.full_dofs())
+        self.body = Articulation.of(model.figure, dofs or model.figure.full_dofs())
         low = [
             lower_markers(self.body, model, levels, tolerances, limbs, limits)
             for levels, limbs in ((priorities, flext), (dict.fromkeys(PRIORITIES, 0), False))
         ]
         self.parts = low[0].parts
         self._engine, self._starter = TrackingEngine(low[0]), TrackingEngine(low[1])
-        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping)
+        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping, True)
         self._rest = attractor_state(self.body, PostureTask())
 
     @property
@@ -182,14 +185,15 @@ class MarkerTracker:
         if not (np.isfinite(rate) and rate > 0):
             raise TargetError(f"the frame rate must be positive, got {rate}")
         report = progress or _silent
-        out, state = self._follow(markers, 1 / rate, report)
+        steady = two_sided is False  # what is followed both ways is made steady afterwards
+        out, state = self._follow(markers, 1 / rate, report, steady)
         if two_sided is None:
             two_sided = len(markers) > 1 and bool(np.any(out.flags != tp.USED))
         if two_sided:  # the way back begins where this one ended, and knows what it has learnt
             state.speed[:, :3] *= -1.0
             state.lag[:] = 0.0
-            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done))
-            out = blend(self.body, self.model, out, reverse(back), markers, rate)
+            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done), False)
+            out = blend(self.body, self.model, out, reverse(back), markers, self._rest, rate)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)
@@ -199,22 +203,26 @@ class MarkerTracker:
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
         self.solve(places, self.solve(places), 0.01)
 
-    def _follow(self, markers: Array, dt: float, progress: Callable[[int], None]) -> tuple[Followed, State]:
+    def _follow(
+        self, markers: Array, dt: float, progress: Callable[[int], None], steady: bool
+    ) -> tuple[Followed, State]:
         """Once through the frames; those before the first with enough markers take its pose."""
         first = next((f for f, frame in enumerate(markers) if _enough(frame)), 0)
         begun, state = self._begin(markers[first])
-        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done))
+        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done), steady)
         out = join([begun] * (first + 1) + [rest])
         out.flags[:first] = np.where(np.isfinite(markers[:first, :, 0]), tp.REJECTED, tp.LOST)
         out.residual[:first] = 0.0
         return out, state
 
-    def _run(self, markers: Array, state: State, dt: float, progress: Callable[[int], None]) -> Followed:
+    def _run(
+        self, markers: Array, state: State, dt: float, progress: Callable[[int], None], steady: bool
+    ) -> Followed:
         """Frames that continue a state, in chunks."""
-        parts = []
+        parts, options = [], self._options_at(dt)._replace(steady=steady)
         for start in range(0, max(len(markers), 1), CHUNK):
             chunk = markers[start : start + CHUNK]
-            parts.append(self._engine.run(chunk, self._rest, state, self._options_at(dt)))
+            parts.append(self._engine.run(chunk, self._rest, state, options))
             progress(start + len(chunk))
         return join(parts)
 

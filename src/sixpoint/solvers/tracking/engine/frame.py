@@ -13,6 +13,7 @@ from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, 
 from sixpoint.solvers.prioritized.engine.step import scale_step
 from sixpoint.solvers.prioritized.engine.wishes import OFF
 from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows
 from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
@@ -24,6 +25,7 @@ SMOOTH = 0.02  # rates of change are means over about so long [s]
 SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
 ALL, OTHERS, RETURNED = 0, 1, 2
 MORE = 25  # iterations in which only what is back after a gap moves
+POOR = 0.03  # one that ends farther off than this is gone again another way [m]
 CAUTIOUS = 0.1  # their damping at first: the way may be far [m]
 TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
 PENALTY = 100.0  # weight of what exceeds a tolerance
@@ -92,13 +94,6 @@ def largest_step(m, w, step):
 
 
 @helper
-def copy_rows(source, target):
-    for i in range(len(source)):
-        for k in range(4):
-            target[i, k] = source[i, k]
-
-
-@helper
 def merit(w, values, clusters, numbers, memory, flags, goal, part, speed):
     """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
     total = 0.0
@@ -115,7 +110,7 @@ def merit(w, values, clusters, numbers, memory, flags, goal, part, speed):
                 weight += numbers[i, tp.WEIGHT]
                 centre = vec.madd(centre, numbers[i, tp.WEIGHT], error)
                 total += numbers[i, tp.WEIGHT] * vec.dot(error, error)
-        if weight > 0.0 and clusters[k, tp.LAST] == 0:
+        if weight > 0.0 and clusters[k, tp.LAST] == 0 and part != RETURNED:
             tolerance = values[clusters[k, tp.MOVE], pk.TOLERANCE]
             beyond = max(vec.norm(centre) / weight - tolerance, 0.0)
             total += PENALTY * weight * beyond * beyond
@@ -187,6 +182,71 @@ def improve(
     return most, damping
 
 
+@helper
+def returned_error(w, clusters, numbers, memory, flags, goal, speed):
+    """Mean square distance of the markers on joints that are back after a gap [m^2]."""
+    total, weights = 0.0, 1e-9
+    for k in range(len(clusters)):
+        joint, first, count = clusters[k, tp.JOINT], clusters[k, tp.FIRST], clusters[k, tp.COUNT]
+        if speed[joint, 3] == 0.0:
+            continue
+        for i in range(first, first + count):
+            if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
+                local = place_in_joint(numbers, memory, i)
+                place = vec.add(vec.load(w.position, joint), qt.mul_vec(qt.load(w.rotation, joint), local))
+                gap = vec.sub(vec.load(goal, i), place)
+                total += numbers[i, tp.WEIGHT] * vec.dot(gap, gap)
+                weights += numbers[i, tp.WEIGHT]
+    return total / weights
+
+
+@helper
+def reset_returned(m, source, speed, state):
+    """Joints that are back after a gap as in another state; the base stays."""
+    joints = len(m.parent)
+    for j in range(joints):
+        if speed[j, 3] > 0.0 and j != m.base:
+            for k in range(4):
+                state[j, k] = source[j, k]
+                state[joints + 1 + j, k] = source[joints + 1 + j, k]
+
+
+@helper
+def bring_back(
+    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, best, rest,
+    tensor, normal, speed, o,
+):  # fmt: skip
+    """Take joints that are back after a gap to their markers; returns the iterations.
+
+    The way may be far, and limits in between: where it ends elsewhere it is gone again without limits at first,
+    and from the relaxed posture; the best counts.
+    """
+    spent, least = 0, 1e9
+    copy_rows(state, best)
+    for attempt in range(4):
+        if attempt >= 2:
+            reset_returned(m, rest, speed, state)
+        elif attempt == 1:
+            reset_returned(m, best, speed, state)
+        for free in range(attempt % 2, -1, -1):
+            limits = o.limits and free == 0
+            part = tp.Options(limits, o.most, o.dt, False, o.gate, 0.0, o.damping, False)
+            more, _ = improve(
+                m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, rest,
+                tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, part,
+            )  # fmt: skip
+            spent += more
+        off = returned_error(w, clusters, numbers, memory, flags, goal, speed)
+        if off < least:
+            least = off
+            copy_rows(state, best)
+        if least < POOR * POOR or not o.limits:
+            break
+    copy_rows(best, state)
+    compute_world(m, w, state)
+    return spent
+
+
 @entry
 def track_markers(
     body,
@@ -209,6 +269,8 @@ def track_markers(
     before,
     expected,
     old,
+    last,
+    places,
     ahead,
     tensor,
     normal,
@@ -250,20 +312,23 @@ def track_markers(
             tensor, normal, max(speed[joints, 3], o.damping), part, speed, o,
         )  # fmt: skip
         if part == OTHERS:
-            more, _ = improve(
+            iterations[f] += bring_back(
                 m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old,
-                rest, tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
+                last, rest, tensor, normal, speed, o,
             )  # fmt: skip
-            iterations[f] += more
-            arrived = more < MORE
+            arrived = True
         copy_rows(state, old)
         if not o.cold:
             learn_distances(w, segments, numbers, memory, flags[f], goal, speed, o.dt)
             update_speed(m, state, before, speed, table, flags[f], o.dt)
-            take_up(m, state, expected, lag, speed, o.dt, arrived)
-            let_go(m, old, lag)
-            if o.limits:
-                hold_limits(m, balls, old)
+            copy_rows(before, last)
+            let_go(m, last, lag)
+            take_up(m, state, expected, lag, speed, o.dt, arrived, o.steady)
+            if o.steady:
+                let_go(m, old, lag)
+                if o.limits:
+                    hold_limits(m, balls, old)
+                bound_ends(m, w, state, before, old, last, expected, places, lag, speed, o.dt)
             compute_world(m, w, old)
         locals_of_hinges(m, old)
         for i in range(len(table)):

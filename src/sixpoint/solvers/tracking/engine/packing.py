@@ -32,16 +32,17 @@ class Options(NamedTuple):
     gate: float
     posture: float
     damping: float
+    steady: bool
 
 
 def pack_options(options):
-    """Options as seven numbers."""
+    """Options as eight numbers."""
     return [float(value) for value in options]
 
 
 @helper
 def unpack_options(numbers):
-    """Options from seven numbers."""
+    """Options from eight numbers."""
     return Options(
         numbers[0] > 0.0,
         int(numbers[1]),
@@ -50,4 +51,5 @@ def unpack_options(numbers):
         numbers[4],
         numbers[5],
         numbers[6],
+        numbers[7] > 0.0,
     )
