@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -193,7 +194,8 @@ class MarkerTracker:
             state.speed[:, :3] *= -1.0
             state.lag[:] = 0.0
             back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done), False)
-            out = blend(self.body, self.model, out, reverse(back), markers, self._rest, rate)
+            bound = partial(self._engine.steady, rate=rate, limits=self._options.limits)
+            out = blend(self.body, self.model, out, reverse(back), markers, self._rest, rate, bound)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)

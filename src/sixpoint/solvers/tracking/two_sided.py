@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +31,7 @@ def blend(
     markers: Array,
     rest: Array,
     rate: float,
+    steady: Callable[[Array, NDArray[np.bool_]], Array],
 ) -> Followed:
     """Join both ways: each joint leans to the way that saw its markers last; gaps without any are bridged.
 
@@ -48,6 +51,7 @@ def blend(
     flags = np.where(ahead.flags == back.flags, ahead.flags, np.maximum(ahead.flags, back.flags))
     told = np.isin(flags, (tp.USED, tp.SWAPPED)) @ (carries > 0)
     states = bridge(body, _states(body, world, positions), told, rest, rate)
+    states = steady(states, told)
     rotations, positions = body.rotations_of(states), states[:, len(body.tree), :3]
     moving, translations = body.place_base(rotations, positions)
     places = model.place(*body.rig.compute_transforms(rotations, translations, moving))

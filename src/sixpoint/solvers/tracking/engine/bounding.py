@@ -1,7 +1,8 @@
 """What no marker tells, or what is just back, moves by a few centimetres a frame beyond what carries it.
 
 Such joints go on, sink to the relaxed posture or fade into what was found. Where that would move a joint below
-them too far in one frame, all of them go only a part of the way, in joint space, from what was shown last.
+them too far in one frame, all of them go only a part of the way in joint space, from the pose that was shown last:
+that hangs on what moves on, and is not swung by it.
 """
 
 from sixpoint.kernels import quaternion as qt
@@ -10,10 +11,10 @@ from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine.kinematics import compute_world
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
 
-PACE, STEP = 2.0, 0.035  # how fast, and how far in a frame, at most [m/s, m]
-HALVINGS = 6
+PACE, STEP = 1.8, 0.03  # how fast, and how far in a frame, at most [m/s, m]
+PARTS, HALVINGS = 6, 3  # of the way that are tried
 GONE = 1e-4  # what is less is nothing [rad, m]
-LAST, CARRIED, FOUND, BEFORE = range(4)
+LAST, FOUND, BEFORE, MAY, ABOVE = range(5)
 
 
 @helper
@@ -73,43 +74,55 @@ def mix_below(m, last, goal, share, top, out):
 
 
 @helper
-def exceeds(m, w, places, speed, top, bound, fully):
-    """Whether a joint below moved too far since it was shown last; ``fully``: beyond what it may."""
-    joints = len(m.parent)
-    for j in range(top, joints):
-        if not is_below(m, j, top):
-            continue
-        may = bound
-        if fully:
-            may += places[CARRIED, j, 0]
-        if vec.norm(vec.sub(vec.load(w.position, j), vec.load(places[LAST], j))) > may:
-            return True
-    return False
+def hang(m, w, places, last, top, out):
+    """The joints below as they were shown last, turned as they were in the world if the topmost is a ball.
+
+    ``w`` has the new pose: what is above is there already.
+    """
+    mix_below(m, last, last, 0.0, top, out)
+    above = m.parent[top]
+    if m.kind[top] == BALL and above >= 0:
+        turned = qt.mul(qt.inv(qt.load(w.rotation, above)), qt.load(places[ABOVE], top))
+        qt.store(out, top, qt.normalised(qt.mul(turned, qt.load(last, top))))
 
 
 @helper
-def measure_carried(m, w, places, speed, top):
-    """How far joints below may move anyhow: as what carries them does, or as markers tell that they do."""
+def furthest(m, w, places, top, bound, fully):
+    """By how much a joint below moved further than the bound since it was shown last, or than it may [m]."""
+    most = -1.0
+    for j in range(top, len(m.parent)):
+        if is_below(m, j, top):
+            may = places[MAY, j, 0] if fully else bound
+            way = vec.norm(vec.sub(vec.load(w.position, j), vec.load(places[LAST], j)))
+            most = max(most, way - may)
+    return most
+
+
+@helper
+def measure_allowed(m, w, places, speed, top, bound):
+    """How far joints below may move: as their topmost one does, or so much beyond what markers tell of them."""
     joints = len(m.parent)
+    shift = vec.norm(vec.sub(vec.load(w.position, top), vec.load(places[LAST], top)))
+    if top == m.base:
+        shift = 0.0
     for j in range(top, joints):
         if not is_below(m, j, top):
             continue
-        way = vec.norm(vec.sub(vec.load(w.position, j), vec.load(places[LAST], j)))
+        places[MAY, j, 0] = max(shift, bound)
         if speed[joints + 1 + j, 3] > 0.0 and speed[j, 3] == 0.0:
             told = vec.norm(vec.sub(vec.load(places[FOUND], j), vec.load(places[BEFORE], j)))
-            way = max(way, told)
-        places[CARRIED, j, 0] = way
+            places[MAY, j, 0] = bound + told
 
 
 @helper
-def settle(m, state, shown, lag, speed, share, top):
+def settle(m, state, shown, lag, speed, share, top, known):
     """After a part of the way: what is told lags by the rest; what is not is where it is shown, and slower."""
     joints = len(m.parent)
     for j in range(top, joints):
         if not is_below(m, j, top):
             continue
         row = joints + 1 + j
-        told = speed[row, 3] > 0.0
+        told = known or speed[row, 3] > 0.0
         if j == m.base:
             for k in range(3):
                 lag[joints, k] = shown[joints, k] - state[joints, k] if told else 0.0
@@ -133,8 +146,43 @@ def settle(m, state, shown, lag, speed, share, top):
 
 
 @helper
-def bound_ends(m, w, state, before, shown, last, goal, places, lag, speed, dt):
-    """Shorten the way of loose joints from the ``last`` shown state to this one, in place."""
+def try_share(m, w, places, start, goal, share, top, bound, shown):
+    """Go a share of the way; by how much that is too far [m]."""
+    mix_below(m, start, goal, share, top, shown)
+    compute_world(m, w, shown)
+    return furthest(m, w, places, top, bound, True)
+
+
+@helper
+def go_on(m, w, places, start, goal, top, bound, shown):
+    """Go the largest share of the way that is not too far, or that is least so; returns it."""
+    best, least, above = 0.0, 1e9, 1.0
+    for n in range(PARTS, -1, -1):
+        share = n / PARTS
+        over = try_share(m, w, places, start, goal, share, top, bound, shown)
+        if over < least:
+            best, least = share, over
+        if over <= 0.0:
+            above = share + 1.0 / PARTS
+            break
+    if least <= 0.0 and best < 1.0:
+        for _ in range(HALVINGS):
+            share = 0.5 * (best + above)
+            if try_share(m, w, places, start, goal, share, top, bound, shown) <= 0.0:
+                best = share
+            else:
+                above = share
+    mix_below(m, start, goal, best, top, shown)
+    return best
+
+
+@helper
+def bound_ends(m, w, state, before, shown, last, start, goal, places, lag, speed, dt, known):
+    """Shorten the way of loose joints from the ``last`` shown state to this one, in place.
+
+    With ``known`` the states of all frames are: nothing but the lag changes. Else what no marker tells goes on
+    from where it is shown.
+    """
     joints, bound = len(m.parent), min(PACE * dt, STEP)
     ready = False
     for top in range(joints):
@@ -145,31 +193,24 @@ def bound_ends(m, w, state, before, shown, last, goal, places, lag, speed, dt):
             continue
         if not ready:
             compute_world(m, w, last)
-            keep_places(w, places, LAST)
-        ready = True
+            for j in range(joints):
+                vec.store(places[LAST], j, vec.load(w.position, j))
+                if m.parent[j] >= 0:
+                    qt.store(places[ABOVE], j, qt.load(w.rotation, m.parent[j]))
+            ready = True
         compute_world(m, w, shown)
-        if not exceeds(m, w, places, speed, top, bound, False):
+        if furthest(m, w, places, top, bound, False) <= 0.0:
             continue
         compute_world(m, w, state)
         keep_places(w, places, FOUND)
         compute_world(m, w, before)
         keep_places(w, places, BEFORE)
-        copy_rows(shown, goal)
-        mix_below(m, last, goal, 0.0, top, shown)
         compute_world(m, w, shown)
-        measure_carried(m, w, places, speed, top)
-        mix_below(m, last, goal, 1.0, top, shown)
-        compute_world(m, w, shown)
-        if not exceeds(m, w, places, speed, top, bound, True):
+        measure_allowed(m, w, places, speed, top, bound)
+        if furthest(m, w, places, top, bound, True) <= 0.0:
             continue
-        low, high = 0.0, 1.0
-        for _ in range(HALVINGS):
-            share = 0.5 * (low + high)
-            mix_below(m, last, goal, share, top, shown)
-            compute_world(m, w, shown)
-            if exceeds(m, w, places, speed, top, bound, True):
-                high = share
-            else:
-                low = share
-        mix_below(m, last, goal, low, top, shown)
-        settle(m, state, shown, lag, speed, low, top)
+        copy_rows(shown, goal)
+        copy_rows(shown, start)
+        hang(m, w, places, last, top, start)
+        share = go_on(m, w, places, start, goal, top, bound, shown)
+        settle(m, state, shown, lag, speed, share, top, known)

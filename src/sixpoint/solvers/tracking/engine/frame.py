@@ -17,7 +17,7 @@ from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows
 from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
-from sixpoint.solvers.tracking.engine.smoothing import let_go, take_up
+from sixpoint.solvers.tracking.engine.smoothing import fade_row, let_go, set_pace, take_up
 from sixpoint.solvers.tracking.engine.step import solve_step
 
 COAST = 0.05  # what no marker sees goes on for about so long [s]
@@ -270,6 +270,7 @@ def track_markers(
     expected,
     old,
     last,
+    start,
     places,
     ahead,
     tensor,
@@ -328,7 +329,9 @@ def track_markers(
                 let_go(m, old, lag)
                 if o.limits:
                     hold_limits(m, balls, old)
-                bound_ends(m, w, state, before, old, last, expected, places, lag, speed, o.dt)
+                bound_ends(
+                    m, w, state, before, old, last, start, expected, places, lag, speed, o.dt, False
+                )
             compute_world(m, w, old)
         locals_of_hinges(m, old)
         for i in range(len(table)):
@@ -343,3 +346,35 @@ def track_markers(
             local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(old, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)
         vec.store(translations, f, vec.load(old, joints))
+
+
+@entry
+def steady_states(
+    body, integers, balls, limits, dt, told, states, lag, speed, before, shown, last, start, goal, places, vectors, rows,
+    small, marks, blocks,
+):  # fmt: skip
+    """Bound the way from frame to frame of states (F, 2 J + 1, 4) in place, as the tracker does.
+
+    Joints that are not told (F, J) move by a few centimetres a frame, then catch up.
+    """
+    m = unpack_model(body, integers)
+    joints = len(m.parent)
+    w = unpack_scratch(
+        vectors, rows, small, marks, joints, len(m.hinges), integers[6], blocks, len(m.points)
+    )
+    copy_rows(states[0], before)
+    copy_rows(before, last)
+    for f in range(1, len(states)):
+        for j in range(joints):
+            speed[joints + 1 + j, 3] = 1.0 if told[f, j] else 0.0
+        for row in range(2 * joints + 1):
+            fade_row(lag, row, dt)
+            set_pace(lag, row)
+        copy_rows(states[f], shown)
+        let_go(m, shown, lag)
+        if limits:
+            hold_limits(m, balls, shown)
+        bound_ends(m, w, states[f], before, shown, last, start, goal, places, lag, speed, dt, True)
+        copy_rows(states[f], before)
+        copy_rows(shown, states[f])
+        copy_rows(shown, last)
