@@ -100,6 +100,9 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     swapped = tracked.flags == 3
     if swapped.any():
         rows.append(("swapped", f"{_counted(swapped, done)} found under each other's labels"))
+    if done.widened:
+        wider = [f"{name} by {np.degrees(by):.0f}" for name, by in done.widened.items()]
+        rows.append(("limits", f"widened [degrees] where the markers go beyond: {listed(wider)}"))
     if done.model.missing:
         rows.append(("without markers", f"{listed(done.model.missing)}: kept near the neutral posture"))
     if done.stances is not None:

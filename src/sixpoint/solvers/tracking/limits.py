@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Dofs
-from sixpoint.body.limits import Limits
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.widening import widen
 from sixpoint.solvers.tracking.engine import packing as tp
@@ -27,7 +26,6 @@ def widen_limits(
     model: MarkerModel,
     markers: Array,
     rate: float,
-    limits: Limits | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Dofs, dict[str, float]]:
     """Limits within which the figure can follow its markers.
@@ -39,13 +37,12 @@ def widen_limits(
         model: Who moves.
         markers: (F, M, 3) positions in the model's order [m], NaN where one is not seen.
         rate: Frames per second [Hz].
-        limits: Of forearms, wrists and ankles; the shipped table by default.
         progress: Told how many frames are done.
 
     Returns:
         What may move and how far, and name of a joint -> growth of its limits [rad], the largest first.
     """
-    dofs = model.figure.full_dofs(limits)
+    dofs = model.figure.full_dofs()
     tracker = MarkerTracker(model, limits=False, dofs=dofs)
     free = tracker.solve_frames(markers, rate, two_sided=False, progress=progress)
     body, used = tracker.body, free.flags == tp.USED
