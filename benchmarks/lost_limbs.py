@@ -2,8 +2,9 @@
 
     python benchmarks/lost_limbs.py [--every 6] [--motions boxing walk]
 
-Every limb of every built-in motion, with a gap that begins at every sixth frame. A jump is how much further than in
-the truth a joint moves in one frame; at 60 Hz a frame is 17 ms, and 5 cm are 3 m/s. The worst are listed.
+Every limb of every built-in motion, with a gap that begins at every sixth frame. A jump is how much further
+than in the truth a joint moves in one frame; at 60 Hz a frame is 17 ms, and 5 cm are 3 m/s. The worst are
+listed.
 """
 
 from __future__ import annotations
@@ -103,11 +104,14 @@ def show(name: str, two_sided: bool, jumps: Sequence[Jump], most: int) -> None:
     """Print one motion."""
     error = 100 * np.mean([jump.error for jump in jumps])
     over = sum(jump.size > 0.05 for jump in jumps)
-    print(f"{name}, {'two-sided' if two_sided else 'causal'}: {over} of {len(jumps)} gaps above 5 cm, "
-          f"limb off by {error:.1f} cm in them", flush=True)
+    print(
+        f"{name}, {'two-sided' if two_sided else 'causal'}: {over} of {len(jumps)} gaps above 5 cm, "
+        f"limb off by {error:.1f} cm in them",
+        flush=True,
+    )
     for jump in jumps[:most]:
-        print(f"  {100 * jump.size:5.1f} cm  {jump.joint}, frame {jump.frame} of {jump.limb} lost at {jump.start}",
-              flush=True)
+        where = f"{jump.joint}, frame {jump.frame} of {jump.limb} lost at {jump.start}"
+        print(f"  {100 * jump.size:5.1f} cm  {where}", flush=True)
 
 
 if __name__ == "__main__":

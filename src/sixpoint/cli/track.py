@@ -121,7 +121,9 @@ def track(
     _show(screen, file, done)
 
 
-def replay_markers(screen: Screen, file: Path, reading: object, following: object, view: bool, **place: object) -> None:
+def replay_markers(
+    screen: Screen, file: Path, reading: object, following: object, view: bool, **place: object
+) -> None:
     """Replay a recording of markers at its own rate, in the browser over and over."""
     from sixpoint.jobs.track.replay import replay
 

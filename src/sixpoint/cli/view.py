@@ -21,7 +21,10 @@ MARKERS = (".c3d", ".trc")
 
 
 def view(
-    *files: Annotated[Path, Parameter(help="Motions (.bvh, .amc) and six points (.csv, .npz), or one of markers (.c3d, .trc).")],
+    *files: Annotated[
+        Path,
+        Parameter(help="Motions (.bvh, .amc) and six points (.csv, .npz), or one of markers (.c3d, .trc)."),
+    ],
     method: Annotated[str, Parameter(help="How to solve at the beginning; as of `reconstruct`.")] = "sik+",
     no_limits: NoLimits = False,
     host: Annotated[

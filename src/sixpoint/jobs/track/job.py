@@ -107,7 +107,7 @@ def track(
         out = out or Path(f"{source.stem}_{'six' if six else 'tracked'}.bvh")
         files = check_output(out, OUTPUTS, force)
     files += check_output(picture, (".png",), force) if picture else []
-    keep_sources(files, [source, following.model, following.static, following.layout, following.limits_file, avatar])
+    keep_sources(files, [source, *following.files, avatar])
     hero = None if avatar is None else open_avatar(avatar)
     markers = open_markers(source, reading)
     started = time.perf_counter()
@@ -143,7 +143,9 @@ def track(
         save_angles(compute_joint_angles(motion, model.figure), out, force)
     else:
         save_dressed(model.figure, motion, out, force)
-    done = Tracking(markers, model, positions, tracked, seconds, calibration, stances, reduced, widened, files, driven)
+    done = Tracking(
+        markers, model, positions, tracked, seconds, calibration, stances, reduced, widened, files, driven
+    )
     if picture or report:
         from sixpoint.jobs.track.report import write_picture, write_report  # Matplotlib is slow to import
 

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 log = logging.getLogger("sixpoint")
 
+NEAR = 0.05  # where a marker is still believed on its place [m]
 FEWEST = 3
 """A recording with fewer markers of the model says nothing about a body."""
 
@@ -54,9 +55,7 @@ def find_ranges(
         return model.figure.with_limits(limits).full_dofs(limits), {}
     if not following.limits:
         return model.figure.full_dofs(), {}
-    return widen_limits(
-        model, positions, rate, lambda done: progress("finding limits", done, len(positions))
-    )
+    return widen_limits(model, positions, rate, lambda done: progress("finding limits", done, len(positions)))
 
 
 def select_markers(model: MarkerModel, names: tuple[str, ...]) -> MarkerModel:
@@ -99,3 +98,10 @@ def columns_of(model: MarkerModel, markers: Markers) -> Array:
         if name in markers.names:
             out[:, k] = markers.positions[:, markers.index(name)]
     return out
+
+
+def near_pairs(model: MarkerModel) -> list[tuple[str, str]]:
+    """Markers of one segment that are too near to each other for swapped labels to be found."""
+    apart = np.linalg.norm(model.offsets[:, None] - model.offsets[None], axis=-1)
+    close = (apart < NEAR) & (model.joints[:, None] == model.joints)
+    return [(model.names[a], model.names[b]) for a, b in zip(*np.nonzero(np.triu(close, 1)), strict=True)]

@@ -32,6 +32,11 @@ class Following:
     cutoff: float | None = None
     lock_feet: bool = False
 
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read beside the recording; None for what is not."""
+        return self.model, self.static, self.layout, self.limits_file
+
     def check(self) -> None:
         """Refuse what excludes each other.
 

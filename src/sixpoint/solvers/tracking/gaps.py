@@ -1,11 +1,11 @@
-"""Across gaps in which no marker tells a joint: from the last pose before to the first one after, joint by joint."""
+"""Gaps in which no marker tells a joint: from the last pose before to the first one after, joint by joint."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball
 from sixpoint.solvers.prioritized.articulation import Articulation
 
@@ -24,8 +24,8 @@ def bridge(body: Articulation, states: Array, told: Told, rest: Array, rate: flo
 
     A joint goes on as it moved, ever slower, and over to where it is found again, so that its speed has no
     jump either. The way of a ball is the shorter one between the two, chosen once for the whole gap: it does
-    not change sides where they are half a turn apart. Where one end is missing, or far away in time, it goes by
-    the relaxed posture.
+    not change sides where they are half a turn apart. Where one end is missing, or far away in time, it goes
+    by the relaxed posture.
 
     Args:
         body: What is posed.
@@ -58,14 +58,14 @@ def _fill_ball(turns: Array, told: Told, rest: Array | None, rate: float) -> Arr
     out = turns.copy()
     for start, stop in _gaps(told):
         low, high = max(start - _lead(rate) - 1, 0), min(stop + _lead(rate) + 1, len(turns))
-        pivot = Rotation.from_quat(turns[start - 1 if start else stop])
+        pivot = turns[start - 1 if start else stop]
         part = slice(low, high)
-        chart = (Rotation.from_quat(turns[part]) * pivot.inv()).as_rotvec()
+        chart = rot.to_vector(rot.mul(turns[part], rot.inv(pivot)))
         _unwrap(chart, start - low, stop - low)
-        middle = None if rest is None else (Rotation.from_quat(rest) * pivot.inv()).as_rotvec()
+        middle = None if rest is None else rot.to_vector(rot.mul(rest, rot.inv(pivot)))
         filled = _fill(chart, told[part], middle, rate, FASTEST)
         inside = slice(start - low, stop - low)
-        out[start:stop] = (Rotation.from_rotvec(filled[inside]) * pivot).as_quat()
+        out[start:stop] = rot.mul(rot.from_vector(filled[inside]), pivot)
     return out
 
 
@@ -87,10 +87,10 @@ def _fill(values: Array, told: Told, rest: Array | None, rate: float, fastest: f
         after = stop < len(values)
         first = values[start - 1] if before else None
         last = values[stop] if after else None
-        speeds = _speed(values, told, start - 1, -1, rate), _speed(values, told, stop, 1, rate)
-        speeds = tuple(v * min(1.0, fastest / max(float(np.linalg.norm(v)), 1e-9)) for v in speeds)
+        speeds = [_speed(values, told, *end, rate) for end in ((start - 1, -1), (stop, 1))]
+        speeds = [v * min(1.0, fastest / max(float(np.linalg.norm(v)), 1e-9)) for v in speeds]
         if first is not None and last is not None and (rest is None or stop - start <= LONG * rate):
-            out[start:stop] = _cross(first, last, *speeds, stop - start, rate)
+            out[start:stop] = _cross(first, last, speeds[0], speeds[1], stop - start, rate)
             continue
         if rest is None:
             out[start:stop] = first if first is not None else last

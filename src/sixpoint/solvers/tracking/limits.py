@@ -30,8 +30,8 @@ def widen_limits(
 ) -> tuple[Dofs, dict[str, float]]:
     """Limits within which the figure can follow its markers.
 
-    Limits are a table of people. This person may go beyond it, and a calibration whose neutral posture is a few
-    degrees off moves every angle by as much. Where markers tell a joint's posture well, they are believed.
+    Limits are a table of people. This person may go beyond it, and a calibration whose neutral posture is a
+    few degrees off moves every angle by as much. Where markers tell a joint well, they are believed.
 
     Args:
         model: Who moves.

@@ -131,14 +131,22 @@ class TrackingEngine:
         return out._replace(flags=out.flags[:, self._back], residual=out.residual[:, self._back])
 
     def steady(self, states: Array, told: NDArray[np.bool_], rate: float, limits: bool) -> Array:
-        """States (F, 2 J + 1, 4) in which joints that are not told (F, J) move by a few centimetres a frame."""
+        """States (F, 2 J + 1, 4) in which joints that are not told (F, J) do not jump."""
         out, sizes = np.ascontiguousarray(states), scratch_sizes(self.low.lowered)
         like = np.zeros_like(out[0])
-        steady_states(
-            *self._body, limits, 1 / rate, told, out, *(like.copy() for _ in range(7)),
-            np.zeros((5, self._joints, 4)), *(np.zeros(size) for size in sizes[1:4]),
-            np.zeros(sizes[4], np.int64), len(self.low.lowered.index),
-        )  # fmt: skip
+        arguments: list[Any] = [
+            *self._body,
+            limits,
+            1 / rate,
+            told,
+            out,
+            *(like.copy() for _ in range(7)),
+            np.zeros((5, self._joints, 4)),
+            *(np.zeros(size) for size in sizes[1:4]),
+            np.zeros(sizes[4], np.int64),
+            len(self.low.lowered.index),
+        ]
+        steady_states(*arguments)
         return out
 
     def fresh(self, pose: Array) -> State:

@@ -25,7 +25,7 @@ from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.model import lower_markers
 from sixpoint.solvers.tracking.priorities import PRIORITIES
 from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine, join, reverse
-from sixpoint.solvers.tracking.start import place_base, refuse_strays
+from sixpoint.solvers.tracking.start import find_swaps, place_base, refuse_strays
 from sixpoint.solvers.tracking.two_sided import blend
 
 Array = NDArray[np.float64]
@@ -203,7 +203,7 @@ class MarkerTracker:
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk."""
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
-        self.solve(places, self.solve(places), 0.01)
+        self.solve_frames(np.stack([places, places]), 100.0, two_sided=True)
 
     def _follow(
         self, markers: Array, dt: float, progress: Callable[[int], None], steady: bool
@@ -229,20 +229,33 @@ class MarkerTracker:
         return join(parts)
 
     def _begin(self, markers: Array) -> tuple[Followed, State]:
-        """A first frame: all markers at one level, from the neutral pose; strays are left out."""
-        seen = markers.copy()
+        """A first frame: all markers at one level, from the neutral pose; strays are left out.
+
+        Strays that are where another one should be have each other's labels.
+        """
+        seen, pairs = markers.copy(), []
         for _ in range(STRAYS):
             out, pose = self._begin_with(seen)
             strays = refuse_strays(out.residual[0], out.flags[0], self._options.gate)
             if not strays.any():
                 break
             seen[strays] = np.nan
+        if np.isfinite(self._options.gate):
+            moving, translations = self.body.place_base(out.rotations, out.positions)
+            places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
+            pairs = find_swaps(markers, places[0], np.isnan(seen[:, 0]))
+        if pairs:
+            for pair in pairs:
+                seen[pair] = markers[pair[::-1]]
+            out, pose = self._begin_with(seen)
         state = self._engine.fresh(pose)
         quiet = self._options._replace(dt=1e-6, most=10)
         out = self._engine.run(seen[None], self._rest, state, quiet)
         state.speed[:] = 0.0
         state.lag[:] = 0.0
         out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
+        for pair in pairs:
+            out.flags[0][pair] = tp.SWAPPED
         return out, state
 
     def _begin_with(self, seen: Array) -> tuple[Followed, Array]:

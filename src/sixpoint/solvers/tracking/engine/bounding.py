@@ -1,8 +1,8 @@
 """What no marker tells, or what is just back, moves by a few centimetres a frame beyond what carries it.
 
-Such joints go on, sink to the relaxed posture or fade into what was found. Where that would move a joint below
-them too far in one frame, all of them go only a part of the way in joint space, from the pose that was shown last:
-that hangs on what moves on, and is not swung by it.
+Such joints go on, sink to the relaxed posture or fade into what was found. Where that would move a joint
+below them too far in one frame, all of them go only a part of the way in joint space, from the pose that was
+shown last: that hangs on what moves on, and is not swung by it.
 """
 
 from sixpoint.kernels import quaternion as qt
@@ -100,7 +100,7 @@ def furthest(m, w, places, top, bound, fully):
 
 @helper
 def measure_allowed(m, w, places, speed, top, bound):
-    """How far joints below may move: as their topmost one does, or so much beyond what markers tell of them."""
+    """How far joints below may move: as their topmost one does, or a bound beyond what markers tell."""
     joints = len(m.parent)
     shift = vec.norm(vec.sub(vec.load(w.position, top), vec.load(places[LAST], top)))
     if top == m.base:
@@ -116,7 +116,7 @@ def measure_allowed(m, w, places, speed, top, bound):
 
 @helper
 def settle(m, state, shown, lag, speed, share, top, known):
-    """After a part of the way: what is told lags by the rest; what is not is where it is shown, and slower."""
+    """After a part of the way: what is told lags by the rest; what is not stays where it is shown, slower."""
     joints = len(m.parent)
     for j in range(top, joints):
         if not is_below(m, j, top):
@@ -180,8 +180,8 @@ def go_on(m, w, places, start, goal, top, bound, shown):
 def bound_ends(m, w, state, before, shown, last, start, goal, places, lag, speed, dt, known):
     """Shorten the way of loose joints from the ``last`` shown state to this one, in place.
 
-    With ``known`` the states of all frames are: nothing but the lag changes. Else what no marker tells goes on
-    from where it is shown.
+    With ``known`` the states of all frames are: nothing but the lag changes. Else what no marker tells goes
+    on from where it is shown.
     """
     joints, bound = len(m.parent), min(PACE * dt, STEP)
     ready = False

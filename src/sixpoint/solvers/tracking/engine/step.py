@@ -181,7 +181,9 @@ def hold_others(m, w, speed):
 
 
 @helper
-def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, alone, speed):
+def solve_step(
+    m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, alone, speed
+):
     """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again.
 
     With ``alone`` only joints that are back after a gap move, and all levels are one: the way may be far.
