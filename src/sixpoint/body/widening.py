@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 MOST = np.radians(30.0)
 """What is farther outside is no posture of a person [rad]."""
+LIFTED = np.radians(15.0)
+"""A table that is so wrong about a ball says nothing of this person; wide limits near the antipode trap it."""
 
 
 def widen(dof: JointDof, local: Array, share: float = 0.99) -> tuple[JointDof, float]:
@@ -26,7 +28,8 @@ def widen(dof: JointDof, local: Array, share: float = 0.99) -> tuple[JointDof, f
         share: Of the frames that is to be inside, side by side; the others may be errors.
 
     Returns:
-        The joint's new limits, and the largest growth [rad]; 30 degrees at most.
+        The joint's new limits, and the largest growth [rad]: of hinges 30 degrees at most; a ball that is
+        more than 15 degrees outside is left without limits, infinity.
     """
     if len(local) == 0:
         return dof, 0.0
@@ -54,6 +57,8 @@ def widen(dof: JointDof, local: Array, share: float = 0.99) -> tuple[JointDof, f
     grown = float(max(knots.max(), low, high))
     if not grown:
         return dof, 0.0
+    if grown > LIFTED:
+        return Ball(), float("inf")
     twist = np.array([max(least - low, -np.pi), min(most + high, np.pi)])
     return Ball(replace(limit, psi=np.minimum(limit.psi + knots, np.pi), twist=twist)), grown
 

@@ -105,8 +105,12 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     if near:
         rows.append(("close", f"a swap would not be noticed: {listed([f'{a} and {b}' for a, b in near])}"))
     if done.widened:
-        wider = [f"{name} by {np.degrees(by):.0f}" for name, by in done.widened.items()]
-        rows.append(("limits", f"widened [degrees] where the markers go beyond: {listed(wider)}"))
+        lifted = [name for name, by in done.widened.items() if not np.isfinite(by)]
+        wider = [f"{name} by {np.degrees(by):.0f}" for name, by in done.widened.items() if np.isfinite(by)]
+        if wider:
+            rows.append(("limits", f"widened where the markers go beyond [degrees]: {listed(wider)}"))
+        if lifted:
+            rows.append(("no limits", f"of {listed(lifted)}: the markers are more than 15 degrees beyond"))
     if done.model.missing:
         rows.append(("without markers", f"{listed(done.model.missing)}: kept near the neutral posture"))
     if done.stances is not None:

@@ -12,7 +12,7 @@ from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows
 from sixpoint.solvers.tracking.engine.improving import ALL, OTHERS, bring_back, improve
 from sixpoint.solvers.tracking.engine.packing import unpack_options
-from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
+from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, note_astray, screen
 from sixpoint.solvers.tracking.engine.smoothing import fade_row, let_go, set_pace, take_up
 
 COAST = 0.05  # what no marker sees goes on for about so long [s]
@@ -162,6 +162,9 @@ def track_markers(
             turned = qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i))
             place = vec.add(vec.load(w.position, joint), turned)
             residual[f, i] = vec.norm(vec.sub(vec.load(goal, i), place))
+        if not o.cold:
+            compute_world(m, w, state)
+            note_astray(w, table, numbers, memory, flags[f], goal, o.dt)
         for j in range(joints):
             local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(old, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)

@@ -15,7 +15,7 @@ TURN, MOVE, LAST = 3, 4, 5
 # Columns of a marker's numbers: its place in the joint's frame [m], its weight, its usual distance [m].
 OFFSET, WEIGHT, SPREAD = 0, 3, 4
 # Columns of what is remembered of a marker.
-BIAS, UNSEEN, REFUSED, KNOWN, TRUST = 0, 3, 4, 5, 6
+BIAS, UNSEEN, REFUSED, KNOWN, TRUST, ASTRAY = 0, 3, 4, 5, 6, 7
 MEMORY = 8
 
 USED, LOST, REJECTED, SWAPPED = range(4)
