@@ -58,7 +58,7 @@ def test_info_of_layouts_and_unknown_labels(place, capsys):
     """A layout is named; labels without a role are listed; labels of no set say what would help."""
     out = run(capsys, "info", "walk.c3d", "--layout", "markers24")[1]
     assert "24 markers, which names 59 % of the labels" in out and "24 of 41 markers" in out
-    assert "unknown    nick:STRN" in out
+    assert "unknown    nick:" in out and "nick:STRN" in out
     strange = replace(WALK, names=tuple(f"P{k}" for k in range(41)))
     save_markers(strange, place / "strange.trc")
     code, out, _ = run(capsys, "info", "strange.trc")

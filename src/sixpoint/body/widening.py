@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 MOST = np.radians(30.0)
 """What is farther outside is no posture of a person [rad]."""
 LIFTED = np.radians(15.0)
-"""A table that is so wrong about a ball says nothing of this person; wide limits near the antipode trap it."""
+"""A table that is so wrong says nothing of this person; wide limits near the antipode trap a ball [rad]."""
 
 
 def widen(dof: JointDof, local: Array, share: float = 0.99) -> tuple[JointDof, float]:

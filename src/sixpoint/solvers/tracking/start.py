@@ -69,9 +69,10 @@ def find_swaps(markers: Array, places: Array, strays: NDArray[np.bool_]) -> list
     off = np.linalg.norm(np.where(seen[:, None], markers, places) - places, axis=-1)
     rows = np.flatnonzero(seen & (strays | (off > DOUBTFUL)))
     across = np.linalg.norm(markers[rows, None] - places[None, rows], axis=-1)
-    clear, pairs = np.triu(off[rows, None] + off[rows] - across - across.T, 1), []
+    clear = np.triu(off[rows, None] + off[rows] - across - across.T, 1)
+    found: list[list[int]] = []
     for a, b in zip(*np.unravel_index(np.argsort(-clear, axis=None), clear.shape), strict=True):
         near = max(across[a, b], across[b, a]) < min(STRAY, 0.5 * min(off[rows[a]], off[rows[b]]))
-        if a < b and near and not {rows[a], rows[b]} & {row for pair in pairs for row in pair}:
-            pairs.append([int(rows[a]), int(rows[b])])
-    return pairs
+        if a < b and near and not {rows[a], rows[b]} & {row for pair in found for row in pair}:
+            found.append([int(rows[a]), int(rows[b])])
+    return found

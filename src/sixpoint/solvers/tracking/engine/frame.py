@@ -146,12 +146,16 @@ def track_markers(
             update_speed(m, state, before, speed, table, flags[f], o.dt)
             copy_rows(before, last)
             let_go(m, last, lag)
+            if o.limits:
+                hold_limits(m, balls, last)
             take_up(m, state, expected, lag, speed, o.dt, arrived, o.steady)
             if o.steady:
                 let_go(m, old, lag)
                 if o.limits:
                     hold_limits(m, balls, old)
                 bound_ends(m, w, state, before, old, last, start, expected, places, lag, speed, o.dt, False)
+                if o.limits:
+                    hold_limits(m, balls, old)
             compute_world(m, w, old)
         locals_of_hinges(m, old)
         for i in range(len(table)):
@@ -196,6 +200,8 @@ def steady_states(
         if limits:
             hold_limits(m, balls, shown)
         bound_ends(m, w, states[f], before, shown, last, start, goal, places, lag, speed, dt, True)
+        if limits:
+            hold_limits(m, balls, shown)
         copy_rows(states[f], before)
         copy_rows(shown, states[f])
         copy_rows(shown, last)
