@@ -25,6 +25,17 @@ def copy_rows(source, target):
 
 
 @helper
+def hold_hinges(m, state):
+    """Hinges within their ranges; a ball that hangs in the world while the trunk turns may be outside."""
+    for j in range(len(m.parent)):
+        if m.kind[j] == HINGES:
+            row = len(m.parent) + 1 + j
+            for k in range(m.size[j]):
+                c = m.start[j] + k
+                state[row, k] = min(max(state[row, k], m.bounds[c, 0]), m.bounds[c, 1])
+
+
+@helper
 def is_below(m, j, top):
     """Whether a joint is another one or below it."""
     while j > top:

@@ -9,7 +9,7 @@ from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals
 from sixpoint.solvers.prioritized.engine.limits import hold_limits
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, unpack_model, unpack_scratch
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows
+from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows, hold_hinges
 from sixpoint.solvers.tracking.engine.improving import ALL, OTHERS, bring_back, improve
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, note_astray, screen
@@ -146,8 +146,6 @@ def track_markers(
             update_speed(m, state, before, speed, table, flags[f], o.dt)
             copy_rows(before, last)
             let_go(m, last, lag)
-            if o.limits:
-                hold_limits(m, balls, last)
             take_up(m, state, expected, lag, speed, o.dt, arrived, o.steady)
             if o.steady:
                 let_go(m, old, lag)
@@ -155,7 +153,7 @@ def track_markers(
                     hold_limits(m, balls, old)
                 bound_ends(m, w, state, before, old, last, start, expected, places, lag, speed, o.dt, False)
                 if o.limits:
-                    hold_limits(m, balls, old)
+                    hold_hinges(m, old)
             compute_world(m, w, old)
         locals_of_hinges(m, old)
         for i in range(len(table)):
@@ -201,7 +199,7 @@ def steady_states(
             hold_limits(m, balls, shown)
         bound_ends(m, w, states[f], before, shown, last, start, goal, places, lag, speed, dt, True)
         if limits:
-            hold_limits(m, balls, shown)
+            hold_hinges(m, shown)
         copy_rows(states[f], before)
         copy_rows(shown, states[f])
         copy_rows(shown, last)
