@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
+from sixpoint.body.limits import Limits
 from sixpoint.body.markers import Markers
 from sixpoint.cli.app import main
-from sixpoint.errors import SixpointError
+from sixpoint.errors import Remark, SixpointError
+from sixpoint.formats import load_shape
 from sixpoint.formats.markers import save_markers
 from sixpoint.jobs.marker_models import save_marker_model
 from sixpoint.jobs.solving import Solving
@@ -20,6 +22,8 @@ from sixpoint.jobs.track.feet import find_stances
 from sixpoint.jobs.track.job import track
 from sixpoint.jobs.track.options import Following, parse_labels
 from sixpoint.jobs.track.replay import replay
+from sixpoint.jobs.track.report import describe_tracking
+from sixpoint.jobs.writing import save_dressed
 from sixpoint.live.frames import play_frames
 from sixpoint.live.statistics import Statistics
 from sixpoint.study.tracking import LOST, REFUSED, USED, overall, summarise_markers
@@ -75,6 +79,77 @@ def test_joint_angles_are_written(files, tmp_path):
     """A .mot holds the knees' angles of every frame."""
     track(files[0], tmp_path / "walk.mot", following=following(files))
     assert "nRows=90" in (tmp_path / "walk.mot").read_text().replace(" ", "")
+
+
+def test_a_dressed_body_is_written(files, tmp_path):
+    """A .glb holds the motion and a surface, and is read again with the joints where they were."""
+    done = track(files[0], tmp_path / "walk.glb", following=following(files))
+    assert load_shape(tmp_path / "walk.glb") is not None
+    motion = sp.load(tmp_path / "walk.glb")
+    figure = done.model.figure
+    ours = motion.positions[
+        :, [motion.skeleton.names.index(figure.skeleton.names[j]) for j in body("walk").posed]
+    ]
+    assert np.abs(ours - done.tracked.motion.positions[:, body("walk").posed]).max() < 1e-3
+
+
+def test_limits_of_ones_own_are_kept(files, tmp_path):
+    """--limits FILE is taken as it is; without it the command says where limits were widened."""
+    table = tmp_path / "limits.toml"
+    table.write_text(re.sub(r"(?ms)(\[knee\].*?flexion = )\[[^]]*\]", r"\1[0, 20]", Limits.text()))
+    tight = track(files[0], tmp_path / "a.bvh", following=following(files, limits_file=table))
+    free = track(files[0], tmp_path / "b.bvh", following=following(files))
+    assert not tight.widened and free.widened
+    assert "limits" in dict(describe_tracking(free)) and "limits" not in dict(describe_tracking(tight))
+    figure = tight.model.figure
+    bent = []
+    for done in (tight, free):
+        hip, knee, ankle = (done.tracked.motion.positions[:, j] for j in figure.roles.limbs[2])
+        thigh, shank = knee - hip, ankle - knee
+        cosine = (
+            np.sum(thigh * shank, axis=-1) / np.linalg.norm(thigh, axis=-1) / np.linalg.norm(shank, axis=-1)
+        )
+        bent.append(np.degrees(np.arccos(cosine)).max())
+    assert bent[0] < 21 and bent[1] > 40
+    with pytest.raises(SixpointError, match="exclude each other"):
+        track(files[0], tmp_path / "c.bvh", following=following(files, limits_file=table, limits=False))
+
+
+def test_an_avatar_moves_as_the_person(files, tmp_path):
+    """--avatar writes the avatar with its meshes; its hands are above its feet as the person's are."""
+    hero = tmp_path / "hero.glb"
+    save_dressed(
+        sp.Figure.from_stature(1.2), sp.make_sample("walk", sp.Figure.from_stature(1.2)), hero, False
+    )
+    done = track(files[0], tmp_path / "moved.glb", following=following(files), avatar=hero)
+    moved = sp.load(tmp_path / "moved.glb")
+    assert done.avatar is not None and len(moved) == FRAMES and load_shape(tmp_path / "moved.glb") is not None
+    with pytest.raises(SixpointError, match="an avatar is written as one of these"):
+        track(files[0], tmp_path / "moved.mot", following=following(files), avatar=hero)
+
+
+def test_notes_of_a_reader_are_notes(tmp_path, files, capsys):
+    """A marker that is never seen is a plain note on the screen, no warning."""
+    markers = body("walk").markers[:30].copy()
+    markers[:, 3] = np.nan
+    save_markers(Markers(body("walk").model.names, markers, 60.0, name="x"), tmp_path / "x.c3d")
+    assert (
+        main(["track", str(tmp_path / "x.c3d"), "--model", str(files[1]), "-o", str(tmp_path / "x.bvh")]) == 0
+    )
+    err = capsys.readouterr().err
+    assert "note: " in err and "never seen: t10" in err and "arning" not in err
+
+
+def test_a_recording_of_markers_is_shown(files, monkeypatch):
+    """``sixpoint view FILE.c3d`` is the replay of ``track --view``; what tells who moves is refused."""
+    from sixpoint.cli import view
+
+    shown = []
+    monkeypatch.setattr(view, "replay_markers", lambda screen, *words, **place: shown.append((words, place)))
+    assert main(["view", str(files[0]), "--port", "8123"]) == 0
+    assert shown[0][0][0] == files[0] and shown[0][0][3] and shown[0][1]["port"] == 8123
+    assert main(["view", str(files[0]), "--stature", "1.8"]) == 2
+    assert main(["view", str(files[0]), str(files[0])]) == 2 and len(shown) == 1
 
 
 def test_six_points_of_markers(files, tmp_path):
@@ -133,7 +208,10 @@ def test_a_recording_without_samples_says_so(files, tmp_path):
     positions[:, :2] = body("walk").markers[:4, :2]
     empty = Markers(names, positions, 100.0, name="empty")
     save_markers(empty, tmp_path / "empty.npz")
-    with pytest.raises(SixpointError, match="no frame has three of the model's markers"):
+    with (
+        pytest.warns(Remark, match="never seen"),
+        pytest.raises(SixpointError, match="no frame has three of the model's markers"),
+    ):
         track(tmp_path / "empty.npz", tmp_path / "a.bvh", following=following(files))
 
 

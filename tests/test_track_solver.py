@@ -16,6 +16,8 @@ from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.errors import FigureError, SixpointError, TargetError
 from sixpoint.kernels.linear import solve_normal
+from sixpoint.solvers.tracking.gaps import bridge
+from sixpoint.solvers.tracking.limits import widen_limits
 from sixpoint.solvers.tracking.priorities import find_parts
 from sixpoint.solvers.tracking.solver import LOST, REJECTED, SWAPPED, MarkerTracker
 from track_bodies import body, drop, markers_of
@@ -137,6 +139,78 @@ def test_a_lost_limb_does_not_jump(tracker, part, two_sided):
     steps = np.linalg.norm(np.diff(result.motion.positions, axis=0), axis=-1)
     truth = np.linalg.norm(np.diff(case.motion.positions, axis=0), axis=-1)
     assert steps[:, case.posed].max() < max(0.05, truth[:, case.posed].max() + 0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "start", "two_sided"),
+    [
+        ("boxing", "l_arm", 89, False),
+        ("boxing", "r_arm", 125, False),
+        ("boxing", "l_arm", 41, True),
+        ("reach", "l_arm", 45, True),
+        ("climb_and_hang", "r_leg", 401, False),
+        ("climb_and_hang", "l_arm", 225, True),
+    ],
+)
+def test_the_worst_gaps_do_not_jump(name, part, start, two_sided):
+    """Gaps of a second that once jumped by up to 120 cm: nothing moves 5 cm further than in the truth."""
+    case = body(name, noise=0.001, misplaced=0.008)
+    dofs, _ = widen_limits(case.model, case.markers, 60.0)
+    markers = case.markers.copy()
+    markers[start : start + 60, case.limb(part)] = np.nan
+    result = MarkerTracker(case.model, dofs=dofs).solve_frames(markers, 60.0, two_sided=two_sided)
+    ours, theirs = (
+        np.linalg.norm(np.diff(motion.positions[:, case.posed], axis=0), axis=-1)
+        for motion in (result.motion, case.motion)
+    )
+    assert (ours - theirs).max() < 0.05
+    later = joint_errors(result, case.motion)[start + 120 :, case.posed]
+    assert later.mean() < 0.02
+
+
+def test_a_gap_is_crossed_the_shorter_way():
+    """SciPy's slerp between the ends lies on the path of a joint that rested on both sides of a gap."""
+    case = body("walk")
+    tracker = MarkerTracker(case.model)
+    body_, joint = tracker.body, case.model.figure.roles.shoulder[0]
+    ends = Rotation.from_rotvec([[0.3, 0.2, 0.1], [-1.5, 1.0, 1.4]])
+    states = np.tile(body_.rest_state(), (40, 1, 1))
+    states[:10, joint], states[10:, joint] = ends[0].as_quat(), -ends[1].as_quat()
+    told = np.ones((40, len(body_.tree)), bool)
+    told[10:30, joint] = False
+    out = Rotation.from_quat(bridge(body_, states, told, body_.rest_state(), 60.0)[:, joint])
+    share = (out[10:30] * ends[0].inv()).magnitude() / (ends[1] * ends[0].inv()).magnitude()
+    assert np.all(np.diff(share) > 0) and 0 < share[0] < 0.02 and 0.98 < share[-1] < 1
+    for k, x in enumerate(share):
+        slerp = Rotation.from_rotvec(x * (ends[1] * ends[0].inv()).as_rotvec()) * ends[0]
+        assert (slerp.inv() * out[10 + k]).magnitude() < 1e-9
+
+
+def test_limits_widen_where_markers_contradict_them():
+    """An ankle that turns 20 degrees beyond the table is followed, its limits say by how much, knees stay."""
+    case = body("jump_kick")
+    dofs, grown = widen_limits(case.model, case.markers, 60.0)
+    roles, names = case.model.figure.roles, case.model.figure.skeleton.names
+    assert np.degrees(grown[names[roles.ankle[0]]]) > 10
+    assert not {names[j] for j in roles.knee} & set(grown)
+    strict = MarkerTracker(case.model).solve_frames(case.markers, 60.0)
+    wide = MarkerTracker(case.model, dofs=dofs).solve_frames(case.markers, 60.0)
+    assert np.sqrt(np.mean(wide.residual**2)) < 0.5 * np.sqrt(np.mean(strict.residual**2))
+    assert np.all(dofs[roles.knee[0]].lower == case.model.figure.full_dofs()[roles.knee[0]].lower)
+
+
+@pytest.mark.parametrize(
+    "pair", [("l_knee", "r_knee"), ("l_heel", "l_toe"), ("l_head_front", "r_head_front")]
+)
+def test_labels_swapped_from_the_first_frame_on_are_found(tracker, pair):
+    """A pair that begins swapped is exchanged and reported, until it is right."""
+    case = body("walk")
+    a, b = (case.model.names.index(name) for name in pair)
+    markers = case.markers[:90].copy()
+    markers[:50, [a, b]] = markers[:50, [b, a]]
+    result = tracker.solve_frames(markers, 60.0, two_sided=False)
+    assert np.all(result.flags[:50, [a, b]] == SWAPPED) and np.sum(result.flags == SWAPPED) == 100
+    assert np.linalg.norm(result.motion.positions - case.motion.positions[:90], axis=-1).max() < 0.03
 
 
 def test_gaps_cost_little():

@@ -71,6 +71,10 @@ class OscError(PacketError):
         super().__init__(f"{where}{message}" + (f" (expected {expected})" if expected else ""))
 
 
+class Remark(UserWarning):
+    """What a reader assumed, renamed or left out: the result stands. Commands show it as a note."""
+
+
 def listed(names: Iterable[str], limit: int = 60) -> str:
     """Join names for a message; after ``limit`` names, say how many more there are."""
     names = list(names)

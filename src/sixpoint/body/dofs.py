@@ -86,6 +86,14 @@ class SwingTwist:
         psi = ((c[..., 0] * x + c[..., 1]) * x + c[..., 2]) * x + c[..., 3]
         return np.asarray(np.clip(psi, self.psi.min(), self.psi.max()), float)
 
+    def decompose(self, local: Array) -> tuple[Array, Array, Array]:
+        """Swing, circumduction angle and twist (F,) of rotations (F, 4) [rad]."""
+        segment = rot.mul_vec(local, self.axis)
+        along = segment @ self.axis
+        psi = np.arctan2(np.linalg.norm(segment - along[:, None] * self.axis, axis=-1), along)
+        theta = np.arctan2(segment @ self.side, segment @ self.forward)
+        return psi, theta, 2.0 * np.arctan2(local[:, :3] @ self.axis, local[:, 3])
+
 
 @dataclass(frozen=True)
 class Fixed:

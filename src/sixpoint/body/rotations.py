@@ -60,6 +60,18 @@ def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
     return np.concatenate([axis * np.sin(half), np.cos(half)], axis=-1)
 
 
+def from_vector(v: ArrayLike) -> Array:
+    """Rotations (..., 4) of rotation vectors (..., 3) [rad]."""
+    v = np.asarray(v, float)
+    return np.asarray(Rotation.from_rotvec(v.reshape(-1, 3)).as_quat().reshape(*v.shape[:-1], 4))
+
+
+def to_vector(q: ArrayLike) -> Array:
+    """Rotation vectors (..., 3) of rotations (..., 4), of length 0 to pi [rad]."""
+    q = np.asarray(q, float)
+    return np.asarray(Rotation.from_quat(q.reshape(-1, 4)).as_rotvec().reshape(*q.shape[:-1], 3))
+
+
 def between(u: ArrayLike, v: ArrayLike) -> Array:
     """Shortest rotation that takes unit vector ``u`` (..., 3) to ``v``; half turns about any normal axis."""
     u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))

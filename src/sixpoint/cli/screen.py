@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 from rich.text import Text
 
+from sixpoint.errors import Remark
 from sixpoint.jobs.progress import Progress as Report
 
 WIDE = 200  # columns where no terminal sets a width
@@ -136,7 +137,10 @@ def messages(screen: Screen) -> Iterator[None]:
     def show(message: Warning | str, *_: object) -> None:
         if str(message) not in said:
             said.add(str(message))
-            screen.note(str(message), "warning", "yellow")
+            if isinstance(message, Remark):
+                screen.note(str(message))
+            else:
+                screen.note(str(message), "warning", "yellow")
 
     try:
         with warnings.catch_warnings():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from sixpoint.cli.options import Force, Frames, NoLimits, Rate, Unit
+from sixpoint.cli.options import Force, Frames, LimitsFile, NoLimits, Rate, Unit
 from sixpoint.cli.screen import Screen
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def track(
         str | None, Parameter(help="Follow these labels only: LASI,RASI,LKNE; by default all with a role.")
     ] = None,
     frames: Frames = None,
+    limits: LimitsFile = None,
     no_limits: NoLimits = False,
     cutoff: Annotated[
         float | None, Parameter(help="Filter the markers at this frequency [Hz], without delay: 6 for gait.")
@@ -53,6 +54,9 @@ def track(
         bool, Parameter(negative="", help="Reduce the markers to the six points, and pose by these alone.")
     ] = False,
     method: Annotated[str, Parameter(help="With --six: how to solve, as of `reconstruct`.")] = "sik+",
+    avatar: Annotated[
+        Path | None, Parameter(help="Pose this avatar (.glb, .gltf, .vrm) as the person is, and write it.")
+    ] = None,
     picture: Annotated[
         Path | None, Parameter(help="Also draw body and markers at some frames, to this .png.")
     ] = None,
@@ -85,6 +89,7 @@ def track(
     sixpoint track walk.c3d -o walk.bvh --report walk_report
     sixpoint track walk.trc --static static.trc -o walk.mot --cutoff 6
     sixpoint track dance.c3d --six --method sik-prior
+    sixpoint track walk.c3d --avatar hero.vrm -o hero.glb
     sixpoint track walk.c3d --view
     ```
     """
@@ -94,11 +99,11 @@ def track(
     from sixpoint.jobs.track.options import Following, parse_labels
 
     labels = () if markers is None else parse_labels(markers)
-    following = Following(model, static, layout, labels, not no_limits, cutoff, lock_feet)
+    following = Following(model, static, layout, labels, not no_limits, limits, cutoff, lock_feet)
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
     screen = Screen()
     if live or view:
-        _replay(screen, file, reading, following, view)
+        replay_markers(screen, file, reading, following, view)
         return
     with screen.progress() as progress:
         done = run(
@@ -107,6 +112,7 @@ def track(
             reading=reading,
             following=following,
             six=Solving(method, limits=not no_limits) if six else None,
+            avatar=avatar,
             picture=picture,
             report=report,
             force=force,
@@ -115,7 +121,10 @@ def track(
     _show(screen, file, done)
 
 
-def _replay(screen: Screen, file: Path, reading: object, following: object, view: bool) -> None:
+def replay_markers(
+    screen: Screen, file: Path, reading: object, following: object, view: bool, **place: object
+) -> None:
+    """Replay a recording of markers at its own rate, in the browser over and over."""
     from sixpoint.jobs.track.replay import replay
 
     if view:
@@ -123,7 +132,7 @@ def _replay(screen: Screen, file: Path, reading: object, following: object, view
 
         check_viser()
     with screen.progress() as progress:
-        session = replay(file, reading, following, view=view, progress=progress)  # type: ignore[arg-type]
+        session = replay(file, reading, following, view=view, progress=progress, **place)  # type: ignore[arg-type]
     with session:
         if session.address:
             screen.say(f"open {session.address} in a browser; Ctrl-C ends it", style="bold")
@@ -157,5 +166,9 @@ def _show(screen: Screen, file: Path, done: Tracking) -> None:
         targets, solved, borrowed = done.six
         note = f"; {', '.join(borrowed)} mostly placed by the followed body" if borrowed else ""
         screen.say(f"six points{note}", style="bold")
+        screen.rows(describe.describe_solved(solved, targets))
+    if done.avatar is not None:
+        targets, solved = done.avatar
+        screen.say("avatar", style="bold")
         screen.rows(describe.describe_solved(solved, targets))
     screen.say(describe.describe_files(done.files), style="green")

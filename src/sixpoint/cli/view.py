@@ -13,11 +13,18 @@ from cyclopts import Parameter
 
 from sixpoint.cli.options import Frames, LimitsFile, Mapping, NoLimits, Rate, Unit, Up
 from sixpoint.cli.screen import Screen
+from sixpoint.cli.track import replay_markers
 from sixpoint.errors import SixpointError
+
+MARKERS = (".c3d", ".trc")
+"""What holds nothing but labelled markers."""
 
 
 def view(
-    *files: Annotated[Path, Parameter(help="Motions (.bvh, .amc) and six points (.csv, .npz).")],
+    *files: Annotated[
+        Path,
+        Parameter(help="Motions (.bvh, .amc) and six points (.csv, .npz), or one of markers (.c3d, .trc)."),
+    ],
     method: Annotated[str, Parameter(help="How to solve at the beginning; as of `reconstruct`.")] = "sik+",
     no_limits: NoLimits = False,
     host: Annotated[
@@ -44,6 +51,7 @@ def view(
 ) -> None:
     """Open a page in the browser: a figure and six points to drag, recordings to play, methods to compare.
 
+    A recording of labelled markers is calibrated, followed and played, as by `sixpoint track --view`.
     Without a file the built-in figure stands there. Of a motion the result is shown over the truth, with its
     errors. Only this machine can open the page unless --host says otherwise. Needs viser:
     `pip install "sixpoint[viewer]"`.
@@ -54,15 +62,28 @@ def view(
     sixpoint view
     sixpoint view walk.bvh kick.bvh --method pik
     sixpoint view points.csv --stature 1.68 --out poses
+    sixpoint view walk.c3d
     ```
     """
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
     from sixpoint.jobs.reconstruct import Body
     from sixpoint.jobs.solving import Solving
+    from sixpoint.jobs.track.options import Following
 
     solving = Solving(method, limits=not no_limits, limits_file=limits)
     solving.check()
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
+    if any(path.suffix.lower() in MARKERS for path in files):
+        if len(files) > 1:
+            raise SixpointError("a recording of markers is shown alone: give one file")
+        if any(given is not None for given in (out, skeleton, stature, mapping)):
+            raise SixpointError(
+                "--out, --skeleton, --stature and --mapping are not for markers: these tell who moves"
+            )
+        check_viser()
+        following = Following(limits=not no_limits, limits_file=limits)
+        replay_markers(Screen(), files[0], reading, following, True, host=host, port=port)
+        return
     body = Body(skeleton, stature, mapping)
     show_page(
         lambda clips: clips.open_clips(files, reading=reading, body=body, limits=solving.load_limits()),

@@ -21,6 +21,7 @@ from sixpoint.jobs.solving import Solved, Solving, solve
 
 SAME = 1e-3
 """Part of a body's height within which bones are the same."""
+AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
 AVATARS = tuple(suffix for suffix in GLTF_SUFFIXES if suffix != ".vrma")
 
 

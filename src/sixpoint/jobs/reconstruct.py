@@ -16,14 +16,13 @@ from sixpoint.body.retargeting import Mode
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import MOTION_SUFFIXES, OUTPUT_SUFFIXES, Avatar, save
-from sixpoint.jobs.driving import drive, open_avatar
+from sixpoint.jobs.driving import AVATAR_OUTPUTS, drive, open_avatar
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Opened, Reading, is_targets, open_motion, open_targets
 from sixpoint.jobs.solving import Solved, Solving, solve
 from sixpoint.jobs.writing import check_output, keep_sources, save_dressed
 from sixpoint.study.metrics import Errors, compute_errors
 
-AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
 STATURE = 1.75
 """Stature of the built-in figure where none is given [m]."""
 

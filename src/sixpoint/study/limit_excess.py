@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Ball, Hinges, JointDof, SwingTwist
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
@@ -56,14 +55,10 @@ def swing_twist_excess(limit: SwingTwist, local: Array, margin: float = 0.0) -> 
     when it is overhead and five degrees behind. At the antipode itself no direction and no twist is defined;
     it is inside where any direction reaches it.
     """
-    segment = rot.mul_vec(local, limit.axis)
-    along = segment @ limit.axis
-    psi = np.arctan2(np.linalg.norm(segment - along[:, None] * limit.axis, axis=-1), along)
-    theta = np.arctan2(segment @ limit.side, segment @ limit.forward)
+    psi, theta, tau = limit.decompose(local)
     over = 2.0 * np.pi - psi - limit.psi.max()
     swing = np.minimum(psi - limit.compute_limit(theta), over)
 
-    tau = 2.0 * np.arctan2(local[:, :3] @ limit.axis, local[:, 3])
     least, most = limit.twist
     from_middle = (tau - 0.5 * (least + most) + np.pi) % (2.0 * np.pi) - np.pi
     twist = np.where(psi < np.pi - ANTIPODE, np.abs(from_middle) - 0.5 * (most - least), -np.inf)

@@ -14,7 +14,7 @@ import numpy as np
 
 from sixpoint.body.markers import Markers
 from sixpoint.body.targets import EFFECTORS
-from sixpoint.errors import FormatError, SixpointError, listed
+from sixpoint.errors import FormatError, Remark, SixpointError, listed
 from sixpoint.formats.atomic import check_writable, write_files
 from sixpoint.formats.markers.archive import format_marker_npz, read_marker_npz
 from sixpoint.formats.markers.c3d import read_c3d
@@ -61,7 +61,7 @@ def load_markers(
         FormatError: The file cannot be read; the message says where and what was expected there.
 
     Warns:
-        UserWarning: What was assumed, renamed or left out.
+        Remark: What was assumed, renamed or left out.
     """
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
@@ -78,7 +78,7 @@ def load_markers(
     except SixpointError as error:
         raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
     for note in raw.notes:
-        warnings.warn(f"{path}: {note}", stacklevel=2)
+        warnings.warn(f"{path}: {note}", Remark, stacklevel=2)
     return markers
 
 

@@ -63,7 +63,7 @@ def check(options: Mapping[str, Any]) -> None:
     six = _six(options)
     if six is not None:
         six.check()
-    for name in ("model", "static", "layout"):
+    for name in ("model", "static", "layout", "limits"):
         path = options.get(name)
         if path is not None and not Path(path).is_file():
             raise SixpointError(f"--{name} {path}: there is no such file")
@@ -85,6 +85,7 @@ def _following(options: Mapping[str, Any]) -> Following:
         layout=options.get("layout"),
         markers=() if labels is None else parse_labels(labels),
         limits=not options.get("no_limits", False),
+        limits_file=options.get("limits"),
         cutoff=options.get("cutoff"),
         lock_feet=bool(options.get("lock_feet")),
     )

@@ -7,6 +7,8 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.dofs import Dofs
+from sixpoint.body.limits import Limits
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.markers import Markers
 from sixpoint.calibration.markers import calibrate_markers
@@ -15,11 +17,13 @@ from sixpoint.formats import load_markers
 from sixpoint.jobs.marker_models import load_marker_model
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.track.options import Following
+from sixpoint.solvers.tracking.limits import widen_limits
 
 Array = NDArray[np.float64]
 
 log = logging.getLogger("sixpoint")
 
+NEAR = 0.05  # where a marker is still believed on its place [m]
 FEWEST = 3
 """A recording with fewer markers of the model says nothing about a body."""
 
@@ -32,6 +36,26 @@ def find_model(markers: Markers, following: Following, progress: Progress = sile
         static = None if following.static is None else load_markers(following.static)
         model = calibrate_markers(markers, static, following.layout, progress=progress)
     return select_markers(model, following.markers) if following.markers else model
+
+
+def find_ranges(
+    model: MarkerModel, positions: Array, rate: float, following: Following, progress: Progress = silent
+) -> tuple[Dofs, dict[str, float]]:
+    """What may move and how far, and by how much limits had to be widened: name of a joint -> growth [rad].
+
+    Args:
+        model: Who moves.
+        positions: (F, M, 3) its markers [m], NaN where one is not seen.
+        rate: Frames per second [Hz].
+        following: A table of its own is taken as it is.
+        progress: Told how far the work is.
+    """
+    if following.limits_file is not None:
+        limits = Limits.load(following.limits_file)
+        return model.figure.with_limits(limits).full_dofs(limits), {}
+    if not following.limits:
+        return model.figure.full_dofs(), {}
+    return widen_limits(model, positions, rate, lambda done: progress("finding limits", done, len(positions)))
 
 
 def select_markers(model: MarkerModel, names: tuple[str, ...]) -> MarkerModel:
@@ -74,3 +98,10 @@ def columns_of(model: MarkerModel, markers: Markers) -> Array:
         if name in markers.names:
             out[:, k] = markers.positions[:, markers.index(name)]
     return out
+
+
+def near_pairs(model: MarkerModel) -> list[tuple[str, str]]:
+    """Markers of one segment that are too near to each other for swapped labels to be found."""
+    apart = np.linalg.norm(model.offsets[:, None] - model.offsets[None], axis=-1)
+    close = (apart < NEAR) & (model.joints[:, None] == model.joints)
+    return [(model.names[a], model.names[b]) for a, b in zip(*np.nonzero(np.triu(close, 1)), strict=True)]

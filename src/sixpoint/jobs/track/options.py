@@ -17,7 +17,8 @@ class Following:
         static: A recording of the same person and markers, standing still.
         layout: A TOML table marker label -> role.
         markers: Labels to use; empty for all that have a role.
-        limits: Keep joints within their limits.
+        limits: Keep joints within their limits, widened where the markers themselves contradict them.
+        limits_file: A table of joint limits in place of the shipped one; it is not widened.
         cutoff: Filter the markers without delay at this frequency [Hz]; None for not at all.
         lock_feet: Hold feet still while they stand.
     """
@@ -27,8 +28,14 @@ class Following:
     layout: Path | None = None
     markers: tuple[str, ...] = ()
     limits: bool = True
+    limits_file: Path | None = None
     cutoff: float | None = None
     lock_feet: bool = False
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read beside the recording; None for what is not."""
+        return self.model, self.static, self.layout, self.limits_file
 
     def check(self) -> None:
         """Refuse what excludes each other.
@@ -38,6 +45,8 @@ class Following:
         """
         if self.model is not None and (self.static is not None or self.layout is not None):
             raise SixpointError("--model is calibrated already: leave out --static and --layout")
+        if not self.limits and self.limits_file is not None:
+            raise SixpointError("--limits FILE and --no-limits exclude each other")
         if self.cutoff is not None and not self.cutoff > 0:
             raise SixpointError(f"the cutoff is a positive frequency [Hz], got {self.cutoff}")
 

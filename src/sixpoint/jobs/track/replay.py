@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Reading, open_markers
-from sixpoint.jobs.track.models import columns_of, find_model
+from sixpoint.jobs.track.models import columns_of, find_model, find_ranges
 from sixpoint.jobs.track.options import Following
 from sixpoint.live.frames import play_frames
 from sixpoint.live.statistics import Statistics
@@ -35,10 +35,12 @@ class Replay:
         statistics: Of the run.
     """
 
-    def __init__(self, tracker: MarkerTracker, positions: Array, rate: float, view: bool) -> None:
+    def __init__(
+        self, tracker: MarkerTracker, positions: Array, rate: float, view: tuple[str, int | None] | None
+    ) -> None:
         self.tracker, self.positions, self.rate = tracker, positions, rate
         self.statistics = Statistics()
-        self._page = _Page(tracker, positions) if view else None
+        self._page = _Page(tracker, positions, *view) if view else None
         self.address = self._page.address if self._page else ""
         self._running = True
 
@@ -81,6 +83,8 @@ def replay(
     following: Following | None = None,
     *,
     view: bool = False,
+    host: str = "127.0.0.1",
+    port: int | None = None,
     progress: Progress = silent,
 ) -> Replay:
     """Prepare a replay: read, calibrate or load the model, compile; see ``Replay.run``.
@@ -90,6 +94,8 @@ def replay(
         reading: How to read them.
         following: Whom they are on; filters and held feet need what comes later, so these are left out.
         view: Show it on a page in the browser.
+        host: Address that the page listens on.
+        port: Its port; None: the first free one from 8080.
         progress: Told how far the calibration is.
 
     Raises:
@@ -100,18 +106,19 @@ def replay(
     markers = open_markers(source, reading)
     model = find_model(markers, following, progress)
     positions = columns_of(model, markers)
-    tracker = MarkerTracker(model, limits=following.limits)
+    dofs, _ = find_ranges(model, positions, markers.rate, following, progress)
+    tracker = MarkerTracker(model, limits=following.limits, dofs=dofs)
     tracker.warm_up()
-    return Replay(tracker, positions, markers.rate, view)
+    return Replay(tracker, positions, markers.rate, (host, port) if view else None)
 
 
 class _Page:
     """The body and its markers in a browser; the loop only leaves its newest frame here."""
 
-    def __init__(self, tracker: MarkerTracker, positions: Array) -> None:
+    def __init__(self, tracker: MarkerTracker, positions: Array, host: str, port: int | None) -> None:
         from sixpoint.viewer import Scene, describe_address, open_server
 
-        self._server: Any = open_server()
+        self._server: Any = open_server(host, port)
         self._scene = Scene(self._server, lambda what, value: None)
         self._scene.set_figure(tracker.figure)
         middle = np.nanmean(positions, axis=(0, 1))

@@ -9,6 +9,7 @@ import numpy as np
 from sixpoint.errors import listed
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.track.job import Tracking
+from sixpoint.jobs.track.models import near_pairs
 from sixpoint.jobs.writing import prepare_folder
 from sixpoint.study.canvas import save_canvas
 from sixpoint.study.comparison.curves import encode
@@ -100,6 +101,16 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     swapped = tracked.flags == 3
     if swapped.any():
         rows.append(("swapped", f"{_counted(swapped, done)} found under each other's labels"))
+    near = near_pairs(done.model)
+    if near:
+        rows.append(("close", f"a swap would not be noticed: {listed([f'{a} and {b}' for a, b in near])}"))
+    if done.widened:
+        lifted = [name for name, by in done.widened.items() if not np.isfinite(by)]
+        wider = [f"{name} by {np.degrees(by):.0f}" for name, by in done.widened.items() if np.isfinite(by)]
+        if wider:
+            rows.append(("limits", f"widened where the markers go beyond [degrees]: {listed(wider)}"))
+        if lifted:
+            rows.append(("no limits", f"of {listed(lifted)}: the markers are more than 15 degrees beyond"))
     if done.model.missing:
         rows.append(("without markers", f"{listed(done.model.missing)}: kept near the neutral posture"))
     if done.stances is not None:

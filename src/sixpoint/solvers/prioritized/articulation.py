@@ -157,6 +157,17 @@ class Articulation:
                 states[:, joints + 1 + joint, : dof.size] = dof.compute_angles(local[:, joint])
         return states
 
+    def rotations_of(self, states: Array) -> Array:
+        """Rig rotations (F, J, 4) of states (F, 2 J + 1, 4); the inverse of ``states_of``."""
+        joints = len(self.tree)
+        local = states[:, :joints].copy()
+        for joint, dof in self.dofs.joints.items():
+            if isinstance(dof, Hinges):
+                local[:, joint] = rot.IDENTITY
+                for axis, angle in zip(dof.axes, states[:, joints + 1 + joint, : dof.size].T, strict=True):
+                    local[:, joint] = rot.mul(local[:, joint], rot.from_axis_angle(axis, angle))
+        return np.asarray(rot.mul(rot.mul(self.before, local), self.neutral))
+
     @cached_property
     def _unwinding(self) -> tuple[Array, Array]:
         """What takes a rig's local rotation back to the tree's: inverses of ``before`` and ``neutral``."""

@@ -12,7 +12,7 @@ from sixpoint.kernels.jit import is_cached
 from sixpoint.solvers.prioritized.engine.packing import pack_model
 from sixpoint.solvers.prioritized.model import scratch_sizes
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.engine.frame import track_markers
+from sixpoint.solvers.tracking.engine.frame import steady_states, track_markers
 from sixpoint.solvers.tracking.model import LoweredMarkers
 
 Array = NDArray[np.float64]
@@ -118,7 +118,8 @@ class TrackingEngine:
             rest,
             *state,
             np.zeros((len(low.lowered.index), 5)),
-            *(np.empty_like(state.pose) for _ in range(3)),
+            *(np.empty_like(state.pose) for _ in range(5)),
+            np.zeros((5, self._joints, 4)),
             np.zeros((self._markers, 4)),
             np.zeros((6, 3)),
             np.zeros((columns + 1, columns)),
@@ -128,6 +129,25 @@ class TrackingEngine:
         ]
         track_markers(*arguments)
         return out._replace(flags=out.flags[:, self._back], residual=out.residual[:, self._back])
+
+    def steady(self, states: Array, told: NDArray[np.bool_], rate: float, limits: bool) -> Array:
+        """States (F, 2 J + 1, 4) in which joints that are not told (F, J) do not jump."""
+        out, sizes = np.ascontiguousarray(states), scratch_sizes(self.low.lowered)
+        like = np.zeros_like(out[0])
+        arguments: list[Any] = [
+            *self._body,
+            limits,
+            1 / rate,
+            told,
+            out,
+            *(like.copy() for _ in range(7)),
+            np.zeros((5, self._joints, 4)),
+            *(np.zeros(size) for size in sizes[1:4]),
+            np.zeros(sizes[4], np.int64),
+            len(self.low.lowered.index),
+        ]
+        steady_states(*arguments)
+        return out
 
     def fresh(self, pose: Array) -> State:
         """A state at rest in a pose, nothing known of the markers."""

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sixpoint.body.dofs import Dofs
 from sixpoint.body.figure import Figure
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.body.motion import Motion, Pose
@@ -23,7 +25,7 @@ from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.model import lower_markers
 from sixpoint.solvers.tracking.priorities import PRIORITIES
 from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine, join, reverse
-from sixpoint.solvers.tracking.start import place_base, refuse_strays
+from sixpoint.solvers.tracking.start import find_swaps, place_base, refuse_strays
 from sixpoint.solvers.tracking.two_sided import blend
 
 Array = NDArray[np.float64]
@@ -90,6 +92,7 @@ class MarkerTracker:
         damping: Lever below which a turn is damped [m].
         tolerances: Part -> how far the centre of its markers may be off before it is held there, whatever
             that costs the parts below [m]; 2 cm by default. Within it all markers count alike.
+        dofs: What may move and how far; by default ``figure.full_dofs()``. See ``widen_limits``.
 
     Raises:
         SixpointError: An option makes no sense; the message says what would.
@@ -106,6 +109,7 @@ class MarkerTracker:
         gate: float = 0.04,
         damping: float = 0.05,
         tolerances: Mapping[str, float] | None = None,
+        dofs: Dofs | None = None,
     ) -> None:
         if not (int(iterations) == iterations and iterations >= 1):
             raise SixpointError(f"iterations are a whole number from 1, got {iterations}")
@@ -113,14 +117,14 @@ class MarkerTracker:
             if not value > 0:
                 raise SixpointError(f"the {name} is a positive number [m], got {value}")
         self.model = model
-        self.body = Articulation.of(model.figure, model.figure.full_dofs())
+        self.body = Articulation.of(model.figure, dofs or model.figure.full_dofs())
         low = [
             lower_markers(self.body, model, levels, tolerances, limbs, limits)
             for levels, limbs in ((priorities, flext), (dict.fromkeys(PRIORITIES, 0), False))
         ]
         self.parts = low[0].parts
         self._engine, self._starter = TrackingEngine(low[0]), TrackingEngine(low[1])
-        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping)
+        self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping, True)
         self._rest = attractor_state(self.body, PostureTask())
 
     @property
@@ -182,14 +186,16 @@ class MarkerTracker:
         if not (np.isfinite(rate) and rate > 0):
             raise TargetError(f"the frame rate must be positive, got {rate}")
         report = progress or _silent
-        out, state = self._follow(markers, 1 / rate, report)
+        steady = two_sided is False  # what is followed both ways is made steady afterwards
+        out, state = self._follow(markers, 1 / rate, report, steady)
         if two_sided is None:
             two_sided = len(markers) > 1 and bool(np.any(out.flags != tp.USED))
         if two_sided:  # the way back begins where this one ended, and knows what it has learnt
             state.speed[:, :3] *= -1.0
             state.lag[:] = 0.0
-            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done))
-            out = blend(self.body, self.model, out, reverse(back), markers, rate)
+            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done), False)
+            bound = partial(self._engine.steady, rate=rate, limits=self._options.limits)
+            out = blend(self.body, self.model, out, reverse(back), markers, self._rest, rate, bound)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)
@@ -197,42 +203,59 @@ class MarkerTracker:
     def warm_up(self) -> None:
         """Compile the kernels, or load them from disk."""
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
-        self.solve(places, self.solve(places), 0.01)
+        self.solve_frames(np.stack([places, places]), 100.0, two_sided=True)
 
-    def _follow(self, markers: Array, dt: float, progress: Callable[[int], None]) -> tuple[Followed, State]:
+    def _follow(
+        self, markers: Array, dt: float, progress: Callable[[int], None], steady: bool
+    ) -> tuple[Followed, State]:
         """Once through the frames; those before the first with enough markers take its pose."""
         first = next((f for f, frame in enumerate(markers) if _enough(frame)), 0)
         begun, state = self._begin(markers[first])
-        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done))
+        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done), steady)
         out = join([begun] * (first + 1) + [rest])
         out.flags[:first] = np.where(np.isfinite(markers[:first, :, 0]), tp.REJECTED, tp.LOST)
         out.residual[:first] = 0.0
         return out, state
 
-    def _run(self, markers: Array, state: State, dt: float, progress: Callable[[int], None]) -> Followed:
+    def _run(
+        self, markers: Array, state: State, dt: float, progress: Callable[[int], None], steady: bool
+    ) -> Followed:
         """Frames that continue a state, in chunks."""
-        parts = []
+        parts, options = [], self._options_at(dt)._replace(steady=steady)
         for start in range(0, max(len(markers), 1), CHUNK):
             chunk = markers[start : start + CHUNK]
-            parts.append(self._engine.run(chunk, self._rest, state, self._options_at(dt)))
+            parts.append(self._engine.run(chunk, self._rest, state, options))
             progress(start + len(chunk))
         return join(parts)
 
     def _begin(self, markers: Array) -> tuple[Followed, State]:
-        """A first frame: all markers at one level, from the neutral pose; strays are left out."""
-        seen = markers.copy()
+        """A first frame: all markers at one level, from the neutral pose; strays are left out.
+
+        Strays that are where another one should be have each other's labels.
+        """
+        seen, pairs = markers.copy(), []
         for _ in range(STRAYS):
             out, pose = self._begin_with(seen)
             strays = refuse_strays(out.residual[0], out.flags[0], self._options.gate)
             if not strays.any():
                 break
             seen[strays] = np.nan
+        if np.isfinite(self._options.gate):
+            moving, translations = self.body.place_base(out.rotations, out.positions)
+            places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
+            pairs = find_swaps(markers, places[0], np.isnan(seen[:, 0]))
+        if pairs:
+            for pair in pairs:
+                seen[pair] = markers[pair[::-1]]
+            out, pose = self._begin_with(seen)
         state = self._engine.fresh(pose)
         quiet = self._options._replace(dt=1e-6, most=10)
         out = self._engine.run(seen[None], self._rest, state, quiet)
         state.speed[:] = 0.0
         state.lag[:] = 0.0
         out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
+        for pair in pairs:
+            out.flags[0][pair] = tp.SWAPPED
         return out, state
 
     def _begin_with(self, seen: Array) -> tuple[Followed, Array]:

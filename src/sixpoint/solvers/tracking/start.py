@@ -14,6 +14,7 @@ from sixpoint.solvers.tracking.engine import packing as tp
 Array = NDArray[np.float64]
 
 STRAY = 0.1  # a marker that is farther than this from its place in a first frame is no one's [m]
+DOUBTFUL = 0.05  # and one that is farther than this may have another's label [m]
 TIMES = 5.0  # unless others are as far: this times their median
 
 
@@ -54,3 +55,24 @@ def refuse_strays(residual: Array, flags: NDArray[np.int64], gate: float) -> NDA
     bad = used & (residual > limit)
     worst = np.sort(residual[used])[-max(1, int(used.sum()) // 6)]
     return np.asarray(bad & (residual >= worst), bool)
+
+
+def find_swaps(markers: Array, places: Array, strays: NDArray[np.bool_]) -> list[list[int]]:
+    """Pairs of markers that are where the other one should be, the clearest first.
+
+    Args:
+        markers: (M, 3) of a first frame [m], NaN where one is not seen.
+        places: (M, 3) where they should be in a pose that the others tell [m].
+        strays: (M,) which were left out of it; others count where they are off by more than 5 cm.
+    """
+    seen = np.isfinite(markers[:, 0])
+    off = np.linalg.norm(np.where(seen[:, None], markers, places) - places, axis=-1)
+    rows = np.flatnonzero(seen & (strays | (off > DOUBTFUL)))
+    across = np.linalg.norm(markers[rows, None] - places[None, rows], axis=-1)
+    clear = np.triu(off[rows, None] + off[rows] - across - across.T, 1)
+    found: list[list[int]] = []
+    for a, b in zip(*np.unravel_index(np.argsort(-clear, axis=None), clear.shape), strict=True):
+        near = max(across[a, b], across[b, a]) < min(STRAY, 0.5 * min(off[rows[a]], off[rows[b]]))
+        if a < b and near and not {rows[a], rows[b]} & {row for pair in found for row in pair}:
+            found.append([int(rows[a]), int(rows[b])])
+    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from sixpoint.body.dofs import Hinges
 from sixpoint.body.marker_model import MarkerModel
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.gaps import bridge
 from sixpoint.solvers.tracking.model import carrier_of
 from sixpoint.solvers.tracking.running import Followed
 
@@ -21,9 +24,16 @@ EVEN = 0.02  # doubt of both ways where nothing is missing [s]
 
 
 def blend(
-    body: Articulation, model: MarkerModel, ahead: Followed, back: Followed, markers: Array, rate: float
+    body: Articulation,
+    model: MarkerModel,
+    ahead: Followed,
+    back: Followed,
+    markers: Array,
+    rest: Array,
+    rate: float,
+    steady: Callable[[Array, NDArray[np.bool_]], Array],
 ) -> Followed:
-    """Join both ways: each joint leans to the way that saw its markers last.
+    """Join both ways: each joint leans to the way that saw its markers last; gaps without any are bridged.
 
     Hinges stay hinges within their ranges; a ball between two allowed rotations may be a little outside.
 
@@ -34,13 +44,17 @@ def blend(
     doubt = doubt_of(ahead.flags, rate) @ carries, doubt_of(back.flags[::-1], rate)[::-1] @ carries
     share = (doubt[0] + EVEN) / (doubt[0] + doubt[1] + 2 * EVEN)
     # In the world: there both ways agree about what markers tell, however they bend the back to it.
-    rotations = _local(body, _mix(_world(body, ahead), _world(body, back), share))
+    world = _mix(_world(body, ahead), _world(body, back), share)
     base = share[:, body.base, None]
     positions = (1 - base) * ahead.positions + base * back.positions
-    moving, translations = body.place_base(rotations, positions)
-    places = model.place(*body.rig.compute_transforms(rotations, translations, moving))
     # A marker is refused or exchanged where one way did; what both saw is used.
     flags = np.where(ahead.flags == back.flags, ahead.flags, np.maximum(ahead.flags, back.flags))
+    told = np.isin(flags, (tp.USED, tp.SWAPPED)) @ (carries > 0)
+    states = bridge(body, _states(body, world, positions), told, rest, rate)
+    states = steady(states, told)
+    rotations, positions = body.rotations_of(states), states[:, len(body.tree), :3]
+    moving, translations = body.place_base(rotations, positions)
+    places = model.place(*body.rig.compute_transforms(rotations, translations, moving))
     residual = np.linalg.norm(markers - places, axis=-1)
     residual = np.where(np.isfinite(residual), residual, 0.0)
     swapped = flags == tp.SWAPPED
@@ -75,20 +89,16 @@ def _world(body: Articulation, way: Followed) -> Array:
     return body.rig.compute_transforms(way.rotations, translations, moving)[1]
 
 
-def _local(body: Articulation, world: Array) -> Array:
-    """Local rotations of world rotations (F, J, 4); hinges keep what they can express."""
+def _states(body: Articulation, world: Array, positions: Array) -> Array:
+    """States of world rotations (F, J, 4) and base positions; hinges keep what they can express."""
     local = rot.mul(rot.inv(world[:, np.maximum(body.tree.parents, 0)]), world)
     local[:, 0] = world[:, 0]
+    states = body.states_of(local, positions)
     for joint, dof in body.dofs.joints.items():
-        if not isinstance(dof, Hinges):
-            continue
-        before, after = body.before[joint], body.neutral[joint]
-        angles = dof.compute_angles(rot.mul(rot.mul(rot.inv(before), local[:, joint]), rot.inv(after)))
-        turned = np.tile(before, (len(local), 1))
-        for axis, angle in zip(dof.axes, np.clip(angles, dof.lower, dof.upper).T, strict=True):
-            turned = rot.mul(turned, rot.from_axis_angle(axis, angle))
-        local[:, joint] = rot.mul(turned, after)
-    return np.asarray(local)
+        if isinstance(dof, Hinges):
+            row, part = len(body.tree) + 1 + joint, slice(0, dof.size)
+            states[:, row, part] = np.clip(states[:, row, part], dof.lower, dof.upper)
+    return states
 
 
 def _mix(a: Array, b: Array, share: Array) -> Array:

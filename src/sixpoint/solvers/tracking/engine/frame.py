@@ -5,31 +5,18 @@ from math import exp
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper
-from sixpoint.solvers.prioritized.engine import packing as pk
-from sixpoint.solvers.prioritized.engine.frame import posture_wish
-from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges, retract
+from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals_of_hinges
 from sixpoint.solvers.prioritized.engine.limits import hold_limits
-from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, Settings, unpack_model, unpack_scratch
-from sixpoint.solvers.prioritized.engine.step import scale_step
-from sixpoint.solvers.prioritized.engine.wishes import OFF
+from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, unpack_model, unpack_scratch
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.engine.clusters import build_cluster, place_in_joint
+from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows, hold_hinges
+from sixpoint.solvers.tracking.engine.improving import ALL, OTHERS, bring_back, improve
 from sixpoint.solvers.tracking.engine.packing import unpack_options
-from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, screen
-from sixpoint.solvers.tracking.engine.smoothing import let_go, take_up
-from sixpoint.solvers.tracking.engine.step import solve_step
+from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, note_astray, screen
+from sixpoint.solvers.tracking.engine.smoothing import fade_row, let_go, set_pace, take_up
 
 COAST = 0.05  # what no marker sees goes on for about so long [s]
 SMOOTH = 0.02  # rates of change are means over about so long [s]
-SMALL = 0.02  # a step below this needs no other: what is left is its square [rad, m]
-ALL, OTHERS, RETURNED = 0, 1, 2
-MORE = 25  # iterations in which only what is back after a gap moves
-CAUTIOUS = 0.1  # their damping at first: the way may be far [m]
-TURN, SHIFT = 0.5, 0.3  # largest step of one iteration [rad, m]
-PENALTY = 100.0  # weight of what exceeds a tolerance
-WORSE, SLACK = 1.01, 1e-5  # a merit beyond this share and sum [m^2] is worse: the posture moves a little
-STIFFEST = 1.0  # largest damping [m]
-CAP = 6.0  # largest speed towards the posture [rad/s]
 
 
 @helper
@@ -82,111 +69,6 @@ def update_speed(m, state, before, speed, table, flags, dt):
                 speed[row, k] = keep * (speed[row, k] + share * (rate - speed[row, k]))
 
 
-@helper
-def largest_step(m, w, step):
-    """Largest change of a coordinate in a row."""
-    largest = 0.0
-    for c in range(len(m.hinges)):
-        largest = max(largest, abs(w.rows[step, c]))
-    return largest
-
-
-@helper
-def copy_rows(source, target):
-    for i in range(len(source)):
-        for k in range(4):
-            target[i, k] = source[i, k]
-
-
-@helper
-def merit(w, values, clusters, numbers, memory, flags, goal, part, speed):
-    """What an iteration must not increase: squared errors, and what important clusters exceed theirs by."""
-    total = 0.0
-    for k in range(len(clusters)):
-        joint, first, count = clusters[k, tp.JOINT], clusters[k, tp.FIRST], clusters[k, tp.COUNT]
-        weight, centre = 0.0, (0.0, 0.0, 0.0)
-        if part == OTHERS and speed[joint, 3] > 0.0:
-            continue
-        for i in range(first, first + count):
-            if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
-                local = place_in_joint(numbers, memory, i)
-                place = vec.add(vec.load(w.position, joint), qt.mul_vec(qt.load(w.rotation, joint), local))
-                error = vec.sub(vec.load(goal, i), place)
-                weight += numbers[i, tp.WEIGHT]
-                centre = vec.madd(centre, numbers[i, tp.WEIGHT], error)
-                total += numbers[i, tp.WEIGHT] * vec.dot(error, error)
-        if weight > 0.0 and clusters[k, tp.LAST] == 0:
-            tolerance = values[clusters[k, tp.MOVE], pk.TOLERANCE]
-            beyond = max(vec.norm(centre) / weight - tolerance, 0.0)
-            total += PENALTY * weight * beyond * beyond
-    return total
-
-
-@helper
-def improve(
-    m, w, balls, index, values, clusters, numbers, memory, flags, goal, forced, state, old, rest, tensor,
-    normal, damping, part, speed, o,
-):  # fmt: skip
-    """Iterate one frame; returns the iterations and the damping that the next one begins with.
-
-    ``part`` says whether all clusters count, those of joints that are back after a gap not, or only such
-    joints move.
-
-    Where a step makes things worse, limits that it ran into made it so: it is taken back, and the next one is
-    more damped (Levenberg, Marquardt).
-    """
-    step = len(w.row) + 1
-    settings = Settings(o.limits, 1.0, TURN, SHIFT, 1e-4, o.posture, CAP * o.dt, False, o.most, 1, 1)
-    if o.limits:
-        hold_limits(m, balls, state)
-    compute_world(m, w, state)
-    here = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
-    most = o.most if part != RETURNED else MORE
-    for n in range(most):
-        for k in range(len(clusters)):
-            build_cluster(m, w, index, values, clusters, numbers, memory, flags, goal, k, state, tensor)
-            if part == OTHERS and speed[clusters[k, tp.JOINT], 3] > 0.0:
-                w.block[clusters[k, tp.MOVE], 2] = OFF
-                w.block[clusters[k, tp.TURN], 2] = OFF
-        posture = -1
-        if o.posture > 0.0 and (n == 0 or o.cold):
-            posture = step + 1
-            posture_wish(m, w, state, rest, o.posture, CAP * o.dt, posture)
-        solve_step(
-            m,
-            w,
-            balls,
-            index,
-            values,
-            clusters,
-            forced,
-            state,
-            damping,
-            o,
-            posture,
-            normal,
-            part == RETURNED,
-            speed,
-        )
-        scale_step(m, w, settings, step, 1.0)
-        copy_rows(state, old)
-        retract(m, w, state, step)
-        if o.limits:
-            hold_limits(m, balls, state)
-        compute_world(m, w, state)
-        there = merit(w, values, clusters, numbers, memory, flags, goal, part, speed)
-        if there > WORSE * here + SLACK:
-            copy_rows(old, state)
-            compute_world(m, w, state)
-            damping = min(4.0 * damping, STIFFEST)
-            continue
-        here = there
-        damping = max(0.5 * damping, o.damping)
-        if largest_step(m, w, step) < (1e-3 if o.cold else SMALL):
-            return n + 1, damping
-    return most, damping
-
-
 @entry
 def track_markers(
     body,
@@ -209,6 +91,9 @@ def track_markers(
     before,
     expected,
     old,
+    last,
+    start,
+    places,
     ahead,
     tensor,
     normal,
@@ -250,20 +135,25 @@ def track_markers(
             tensor, normal, max(speed[joints, 3], o.damping), part, speed, o,
         )  # fmt: skip
         if part == OTHERS:
-            more, _ = improve(
+            iterations[f] += bring_back(
                 m, w, balls, index, values, clusters, numbers, memory, flags[f], goal, forced, state, old,
-                rest, tensor, normal, max(CAUTIOUS, o.damping), RETURNED, speed, o,
+                last, rest, tensor, normal, speed, o,
             )  # fmt: skip
-            iterations[f] += more
-            arrived = more < MORE
+            arrived = True
         copy_rows(state, old)
         if not o.cold:
             learn_distances(w, segments, numbers, memory, flags[f], goal, speed, o.dt)
             update_speed(m, state, before, speed, table, flags[f], o.dt)
-            take_up(m, state, expected, lag, speed, o.dt, arrived)
-            let_go(m, old, lag)
-            if o.limits:
-                hold_limits(m, balls, old)
+            copy_rows(before, last)
+            let_go(m, last, lag)
+            take_up(m, state, expected, lag, speed, o.dt, arrived, o.steady)
+            if o.steady:
+                let_go(m, old, lag)
+                if o.limits:
+                    hold_limits(m, balls, old)
+                bound_ends(m, w, state, before, old, last, start, expected, places, lag, speed, o.dt, False)
+                if o.limits:
+                    hold_hinges(m, old)
             compute_world(m, w, old)
         locals_of_hinges(m, old)
         for i in range(len(table)):
@@ -274,7 +164,42 @@ def track_markers(
             turned = qt.mul_vec(qt.load(w.rotation, joint), vec.load(numbers, i))
             place = vec.add(vec.load(w.position, joint), turned)
             residual[f, i] = vec.norm(vec.sub(vec.load(goal, i), place))
+        if not o.cold:
+            compute_world(m, w, state)
+            note_astray(w, table, numbers, memory, flags[f], goal, o.dt)
         for j in range(joints):
             local = qt.mul(qt.mul(qt.load(m.before, j), qt.load(old, j)), qt.load(m.after, j))
             qt.store(rotations[f], j, local)
         vec.store(translations, f, vec.load(old, joints))
+
+
+@entry
+def steady_states(
+    body, integers, balls, limits, dt, told, states, lag, speed, before, shown, last, start, goal, places,
+    vectors, rows, small, marks, blocks,
+):  # fmt: skip
+    """Bound the way from frame to frame of states (F, 2 J + 1, 4) in place, as the tracker does.
+
+    Joints that are not told (F, J) move by a few centimetres a frame, then catch up.
+    """
+    m = unpack_model(body, integers)
+    joints = len(m.parent)
+    w = unpack_scratch(vectors, rows, small, marks, joints, len(m.hinges), integers[6], blocks, len(m.points))
+    copy_rows(states[0], before)
+    copy_rows(before, last)
+    for f in range(1, len(states)):
+        for j in range(joints):
+            speed[joints + 1 + j, 3] = 1.0 if told[f, j] else 0.0
+        for row in range(2 * joints + 1):
+            fade_row(lag, row, dt)
+            set_pace(lag, row)
+        copy_rows(states[f], shown)
+        let_go(m, shown, lag)
+        if limits:
+            hold_limits(m, balls, shown)
+        bound_ends(m, w, states[f], before, shown, last, start, goal, places, lag, speed, dt, True)
+        if limits:
+            hold_hinges(m, shown)
+        copy_rows(states[f], before)
+        copy_rows(shown, states[f])
+        copy_rows(shown, last)

@@ -15,7 +15,7 @@ TURN, MOVE, LAST = 3, 4, 5
 # Columns of a marker's numbers: its place in the joint's frame [m], its weight, its usual distance [m].
 OFFSET, WEIGHT, SPREAD = 0, 3, 4
 # Columns of what is remembered of a marker.
-BIAS, UNSEEN, REFUSED, KNOWN, TRUST = 0, 3, 4, 5, 6
+BIAS, UNSEEN, REFUSED, KNOWN, TRUST, ASTRAY = 0, 3, 4, 5, 6, 7
 MEMORY = 8
 
 USED, LOST, REJECTED, SWAPPED = range(4)
@@ -32,16 +32,17 @@ class Options(NamedTuple):
     gate: float
     posture: float
     damping: float
+    steady: bool
 
 
 def pack_options(options):
-    """Options as seven numbers."""
+    """Options as eight numbers."""
     return [float(value) for value in options]
 
 
 @helper
 def unpack_options(numbers):
-    """Options from seven numbers."""
+    """Options from eight numbers."""
     return Options(
         numbers[0] > 0.0,
         int(numbers[1]),
@@ -50,4 +51,5 @@ def unpack_options(numbers):
         numbers[4],
         numbers[5],
         numbers[6],
+        numbers[7] > 0.0,
     )

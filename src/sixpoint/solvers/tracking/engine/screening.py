@@ -20,6 +20,7 @@ MOST = 0.4  # share of refused markers from which on all are believed
 RETURNING = 0.2  # a segment that is back may move to where it is for so long [s]
 AWAY = 2.0  # how far it may be meanwhile [m]
 FORGOTTEN = 2.0  # a marker that is lost so long [s] no longer counts as missing from its segment
+STUCK, ENOUGH = 0.08, 0.03  # a segment that is so far off [m] for so long [s] is sought anew
 ADAPT, FADE = 0.1, 0.15  # times in which usual distances are learnt, and cease to count [s]
 
 
@@ -143,6 +144,38 @@ def readmit(segments, memory, flags, s, dt):
 
 
 @helper
+def note_astray(w, table, numbers, memory, flags, goal, dt):
+    """Count for how long each used marker was far from its place after all."""
+    for i in range(len(flags)):
+        gap = vec.sub(vec.load(goal, i), expected(w, numbers, memory, table[i, tp.JOINT], i))
+        if flags[i] == tp.USED and vec.norm(gap) > STUCK:
+            memory[i, tp.ASTRAY] += dt
+        else:
+            memory[i, tp.ASTRAY] = 0.0
+
+
+@helper
+def is_stuck(segments, memory, flags, s):
+    """Whether all markers of a segment stay far from their places: limits hold it on the wrong side."""
+    used = 0
+    for i in range(segments[s, tp.FIRST], segments[s, tp.FIRST] + segments[s, tp.COUNT]):
+        if flags[i] == tp.USED:
+            used += 1
+            if memory[i, tp.ASTRAY] < ENOUGH:
+                return False
+    return used > 0
+
+
+@helper
+def count_children(m, j):
+    count = 0
+    for k in range(j + 1, len(m.parent)):
+        if m.parent[k] == j:
+            count += 1
+    return count
+
+
+@helper
 def note_returns(m, table, segments, memory, flags, speed, dt):
     """Mark joints that markers are back on, after nothing told how they are: they may have moved far."""
     joints = len(m.parent)
@@ -156,6 +189,12 @@ def note_returns(m, table, segments, memory, flags, speed, dt):
             else:
                 back = True
                 memory[i, tp.UNSEEN] = 0.0
+        j = segments[s, tp.JOINT]
+        if is_stuck(segments, memory, flags, s):
+            speed[j, 3] = RETURNING
+            while m.parent[j] != m.base and m.parent[j] >= 0 and count_children(m, m.parent[j]) == 1:
+                j = m.parent[j]
+                speed[j, 3] = RETURNING
         if not back or alone < 1.5 * dt:
             continue
         j = segments[s, tp.JOINT]

@@ -12,7 +12,7 @@ from sixpoint.kernels.jit import helper
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES
 
 PACE = 0.45  # time for each radian or metre of a jump [s]
-QUICKEST, SLOWEST = 0.06, 0.7  # of it [s]
+QUICKEST, SLOWEST = 0.06, 0.15  # of it [s]
 GONE = 1e-4  # what is less is nothing [rad, m]
 
 
@@ -38,7 +38,7 @@ def set_pace(lag, row):
 
 
 @helper
-def take_up(m, state, expected, lag, speed, dt, arrived):
+def take_up(m, state, expected, lag, speed, dt, arrived, steady):
     """Fade what is left; add what joints that are back were off by, the last time once they arrived."""
     joints = len(m.parent)
     for row in range(2 * joints + 1):
@@ -47,6 +47,8 @@ def take_up(m, state, expected, lag, speed, dt, arrived):
         if speed[j, 3] <= 0.0:
             continue
         speed[j, 3] = 0.0 if arrived else max(speed[j, 3] - dt, 0.0)
+        if not steady:
+            continue
         if j == m.base:
             for k in range(3):
                 lag[joints, k] += expected[joints, k] - state[joints, k]

@@ -181,10 +181,12 @@ def hold_others(m, w, speed):
 
 
 @helper
-def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, held, speed):
+def solve_step(
+    m, w, balls, index, values, clusters, forced, state, damping, o, posture, normal, alone, speed
+):
     """Coordinate changes into row ``fixed + 1``: solve, add what is violated, solve again.
 
-    With ``held`` only joints that are back after a gap move.
+    With ``alone`` only joints that are back after a gap move, and all levels are one: the way may be far.
     """
     fixed = len(w.row)
     step, basis = fixed + 1, fixed + 3 + w.small.shape[1]
@@ -192,13 +194,14 @@ def solve_step(m, w, balls, index, values, clusters, forced, state, damping, o, 
     release(m, w)
     for b in range(len(index)):
         forced[b, 4] = 0.0
-    if held:
+    held = alone
+    if alone:
         hold_others(m, w, speed)
     for _ in range(ROUNDS):
         linear.copy(w.rows, step, fixed)
         size = solve_equalities(m, w, index, forced, fixed, basis) if held else 0
         least_squares(m, w, index, fixed, basis, size, held, damping, posture, normal)
-        added = force_clusters(w, index, values, clusters, forced, step)
+        added = not alone and force_clusters(w, index, values, clusters, forced, step)
         if o.limits and lock_violations(m, w, balls, state, step, fixed):
             added = True
         if not added:
