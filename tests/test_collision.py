@@ -71,7 +71,7 @@ def elliptic(width, depth, radius):
     points = np.stack([width * np.cos(angles), heights, depth * np.sin(angles)], axis=-1).reshape(-1, 3)
     elbow = build_prisms(sp.Figure.from_stature(1.75)).elbow[:1]
     prisms = Prisms((_prism(0, points, 0.3, -0.3, radius),), (replace(elbow[0], radius=radius),), (), radius)
-    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False))
+    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False), None, None)
 
 
 def signed_distance(width, depth, point):
@@ -137,9 +137,9 @@ def test_what_is_off_changes_no_bit(figure, method):
     plain = sp.make_solver(method, figure).solve_frames(targets)
     off = sp.make_solver(method, figure, avoid=()).solve_frames(targets)
     nothing = sp.make_solver(method, figure, avoid="elbows")
-    thin = nothing._arrays[-1].copy()
+    thin = nothing._arrays[-2].copy()
     thin[:-1, 2:4] += 100.0
-    nothing._arrays = (*nothing._arrays[:-1], thin)
+    nothing._arrays = (*nothing._arrays[:-2], thin, None)
     for other in (off, nothing.solve_frames(targets)):
         assert np.array_equal(plain.motion.rotations, other.motion.rotations)
         assert np.array_equal(plain.residual, other.residual)

@@ -25,6 +25,7 @@ HEIGHTS = (0.0, 0.45, 0.8, 1.0)
 WIDTHS = ((1.75, 0.0), (0.75, 0.35), (0.0, 0.76), (0.0, 0.72))
 DEPTHS = (0.105, 0.095, 0.108, 0.085)
 ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))
+THIGH_RADII = (0.092, 0.06)  # at hip and knee, for a height of 1.6 m [m]
 
 
 def parts_of_joints(figure: Figure) -> Index:
@@ -160,3 +161,29 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
             off = np.linalg.norm(arm[near] - t[near, None] * axis, axis=1)
             widest = max(widest, float(np.quantile(off, SHARE)))
     return widest if 0.0 < widest < 3.0 * bare else bare
+
+
+def thigh_radii(figure: Figure) -> tuple[float, float]:
+    """Radii of the thighs at hip and knee [m]: the straight course nearest to that of both thighs' flesh.
+
+    Between these a thigh is as wide as on average around it, so it is narrower than a thigh that is deep.
+    """
+    roles, unit = figure.roles, figure.height / HEIGHT
+    bare = (THIGH_RADII[0] * unit, THIGH_RADII[1] * unit)
+    if figure.shape is None:
+        return bare
+    vertices, parts = neutral_surface(figure)
+    places, widths = [], []
+    for k in range(2):
+        hip, knee = figure.rest_positions[[roles.hip[k], roles.knee[k]]]
+        thigh = vertices[np.isin(parts, np.array([THIGH, SHANK]) + 16 * k)] - hip
+        share = thigh @ (knee - hip) / max(float((knee - hip) @ (knee - hip)), 1e-12)
+        near = (share > 0.1) & (share < 1.05)
+        places.append(share[near])
+        widths.append(np.linalg.norm(thigh[near] - share[near, None] * (knee - hip), axis=1))
+    x, y = np.concatenate(places), np.concatenate(widths)
+    if len(x) < 8 or np.ptp(x) < 0.5:
+        return bare
+    slope, start = np.polyfit(x, y, 1)
+    found = np.array([start, start + slope])
+    return (float(found[0]), float(found[1])) if np.all((found > 0.3 * np.array(bare)) & (found < 3.0 * np.array(bare))) else bare
