@@ -71,7 +71,7 @@ def elliptic(width, depth, radius):
     points = np.stack([width * np.cos(angles), heights, depth * np.sin(angles)], axis=-1).reshape(-1, 3)
     elbow = build_prisms(sp.Figure.from_stature(1.75)).elbow[:1]
     prisms = Prisms((_prism(0, points, 0.3, -0.3, radius),), (replace(elbow[0], radius=radius),), (), radius)
-    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False), None, None)
+    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False), None, None, None)
 
 
 def signed_distance(width, depth, point):

@@ -37,12 +37,14 @@ class Flesh(NamedTuple):
         thighs: (2 + B, 4) thighs and balls that stay out of them, or None.
         placed: (4, 4) left hip and knee, right hip and knee in the world [m]; beside the hips, the swivel
             angle of the last frame from the knee as it was posed in this one [rad].
+        memory: The solver's memory; the clavicles' angles are beside its rows 2 and 3 [rad].
     """
 
     prisms: np.ndarray
     arms: np.ndarray
     thighs: np.ndarray
     placed: np.ndarray
+    memory: np.ndarray
 
 
 def pack_flesh(prisms, lengths, forearms):
@@ -85,7 +87,7 @@ def pack_thighs(radii, balls, lengths, apart):
 
 
 @helper
-def unpack_flesh(table, thighs, placed):
+def unpack_flesh(table, thighs, placed, memory):
     """The flesh as slices; ``placed`` is working memory (4, 4)."""
     last = table.shape[0] - 1
-    return Flesh(table[:last], table[last], thighs, placed)
+    return Flesh(table[:last], table[last], thighs, placed, memory)

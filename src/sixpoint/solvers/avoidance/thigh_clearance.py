@@ -6,7 +6,7 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.packing import THIGH_HEADER
 
-FIRST = 0.25  # share of a thigh above which another one cannot be kept away: hips stand still
+FIRST = 0.25  # as ``body.flesh_regions.NEAR_HIP``; written out, see ``packing``
 ROUNDS = 3  # of finding the nearest points of two capsules
 WIDEST = 4.0  # m, beyond any gap
 

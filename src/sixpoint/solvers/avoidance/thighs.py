@@ -77,7 +77,9 @@ def find_range(limb, circle, balls, leg, before, most):
         inside = 0.0
         while inside < last:
             angle = min(inside + STEP, last)
-            if not is_free(circle.n, circle.u, circle.cosine, circle.sine, 1.0, sign * angle, balls, limb.ball):
+            if not is_free(
+                circle.n, circle.u, circle.cosine, circle.sine, 1.0, sign * angle, balls, limb.ball
+            ):
                 a, b = sign * inside, sign * angle
                 found = edge(circle.n, circle.u, circle.cosine, circle.sine, 1.0, a, b, balls, limb.ball)
                 return sign * min(max(sign * found, inside), angle)

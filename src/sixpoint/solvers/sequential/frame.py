@@ -177,7 +177,16 @@ def solve_frame(model, settings, points, flesh, local, memory, residual, scratch
         if flesh is not None:
             if limb == 0:
                 part_thighs(
-                    flesh.thighs, flesh.placed, model, settings.limits, root, filled, local, world, residual, pi
+                    flesh.thighs,
+                    flesh.placed,
+                    model,
+                    settings.limits,
+                    root,
+                    filled,
+                    local,
+                    world,
+                    residual,
+                    pi,
                 )
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
