@@ -19,8 +19,8 @@ SPACING = 0.012  # m, between points of a surface
 TRUNK, NECK, HEAD, UPPER, LOWER, HAND, THIGH, SHANK, FOOT = range(9)
 SHARE = 0.995  # of the vertices around a bone that its radius encloses
 
-# A trunk without a shape, from the hips (0) over the waist to the shoulders (1): half widths and half depth of
-# elliptic cylinders as shares of the figure's height. At the shoulders that is 3/4 of half the biacromial width.
+# A trunk without a shape, from the hips (0) over the waist to the shoulders (1): half widths and half depth
+# of elliptic cylinders as shares of the figure's height; at the shoulders about 3/4 of half their width.
 HEIGHTS = (0.0, 0.45, 0.8, 1.0)
 WIDTHS = (0.09, 0.075, 0.09, 0.09)
 DEPTH = 0.06

@@ -26,6 +26,7 @@ WIDTH = HEADER + SLICES * RING
 BALL = 3
 SPREAD, FIRST_BALL = 1, 2
 THIGH_HEADER = 2
+PALM = 0.02  # m, half of a hand that lies flat on a thigh, as hands mostly do
 
 
 class Flesh(NamedTuple):
@@ -81,8 +82,10 @@ def pack_thighs(radii, balls, lengths, apart):
     table[0] = *radii, len(balls), apart
     if balls:
         wrist = min((b for b in balls if b.forearm), key=lambda ball: abs(ball.share - 1.0))
-        table[1, :2] = max(ball.share * lengths[ball.forearm] for ball in balls), wrist.radius
-        table[THIGH_HEADER:, :3] = [(ball.forearm, ball.share, ball.radius) for ball in balls]
+        table[1, :2] = max(ball.share * lengths[ball.forearm] for ball in balls), min(wrist.radius, PALM)
+        table[THIGH_HEADER:, :3] = [
+            (b.forearm, b.share, min(b.radius, PALM) if b.share >= 1.0 else b.radius) for b in balls
+        ]
     return table
 
 

@@ -34,8 +34,9 @@ def find_penetration(
 ) -> dict[str, Array]:
     """How deep parts of a body are in others, by the prisms and capsules that solvers keep apart.
 
-    It does not need the mesh of each frame: a few microseconds per frame and part. Wrists count where
-    they are, though no solver can take them out.
+    It needs no mesh of the frames and takes microseconds each. Balls and prisms are wider than flesh, so it
+    says more rather than less: beside the mesh up to 4 cm, hardly ever less than the mesh by 5 mm. Wrists
+    count where they are, though no solver can take them out.
 
     Args:
         figure: Whose body; its shape tells how thick, else a lean adult's measures.
