@@ -7,6 +7,7 @@ from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.packing import THIGH_HEADER
 
 FIRST = 0.25  # as ``body.flesh_regions.NEAR_HIP``; written out, see ``packing``
+BELOW_HIP = 0.15  # the same for arms: nearer to the hip flesh is rounder than a capsule
 ROUNDS = 3  # of finding the nearest points of two capsules
 WIDEST = 4.0  # m, beyond any gap
 
@@ -42,24 +43,27 @@ def gap_of_thighs(placed, hip_radius, knee_radius):
     r = vec.sub(hip, other_hip)
     aa, bb, ab = vec.dot(a, a), vec.dot(b, b), vec.dot(a, b)
     room = aa * bb - ab * ab
-    share = 1.0
+    nearest = 1.0
     if room > 1e-6 * aa * bb:  # where their lines are nearest
-        share = min(max((ab * vec.dot(b, r) - bb * vec.dot(a, r)) / room, FIRST), 1.0)
-    gap = WIDEST
-    for _ in range(ROUNDS):
-        point = vec.madd(hip, share, a)
-        other, _ = place_on(other_hip, other_knee, hip_radius, knee_radius, FIRST, point)
-        beyond = vec.madd(other_hip, other, b)
-        share, gap = place_on(hip, knee, hip_radius, knee_radius, FIRST, beyond)
-        gap -= hip_radius + other * (knee_radius - hip_radius)
-    return gap
+        nearest = min(max((ab * vec.dot(b, r) - bb * vec.dot(a, r)) / room, FIRST), 1.0)
+    least = WIDEST
+    for start in (nearest, 1.0, FIRST):  # nearly parallel thighs are nearest at an end of one
+        share = start
+        for _ in range(ROUNDS):
+            other, _ = place_on(
+                other_hip, other_knee, hip_radius, knee_radius, FIRST, vec.madd(hip, share, a)
+            )
+            beyond = vec.madd(other_hip, other, b)
+            share, gap = place_on(hip, knee, hip_radius, knee_radius, FIRST, beyond)
+            least = min(least, gap - hip_radius - other * (knee_radius - hip_radius))
+    return least
 
 
 @helper
 def is_far(thighs, placed, side, elbow):
     """Whether all of an arm is beside a thigh."""
     hip, knee = vec.load(placed, 2 * side), vec.load(placed, 2 * side + 1)
-    _, gap = place_on(hip, knee, thighs[0, 0], thighs[0, 1], 0.0, elbow)
+    _, gap = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, elbow)
     return gap > thighs[1, 0] + 0.1  # no ball of an arm is wider
 
 
@@ -67,7 +71,7 @@ def is_far(thighs, placed, side, elbow):
 def wrist_in(thighs, placed, side, wrist):
     """How deep the wrist is in a thigh where its target puts it [m], not positive."""
     hip, knee = vec.load(placed, 2 * side), vec.load(placed, 2 * side + 1)
-    _, gap = place_on(hip, knee, thighs[0, 0], thighs[0, 1], 0.0, wrist)
+    _, gap = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, wrist)
     return min(gap - thighs[1, 1], 0.0)
 
 
@@ -95,7 +99,7 @@ def gap_to_thighs(thighs, placed, elbow, up, down, gap):
             ball = thighs[THIGH_HEADER + i]
             forearm = ball[0] > 0.0
             p = vec.madd(elbow, ball[1], down if forearm else up)
-            _, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], 0.0, p)
+            _, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, p)
             off -= ball[2]
             if forearm:
                 off -= ball[1] * wrist_gap
@@ -122,7 +126,7 @@ def deepest_in_thighs(thighs, placed, elbow, up, down, found):
         for i in range(count):
             ball = thighs[THIGH_HEADER + i]
             p = vec.madd(elbow, ball[1], down if ball[0] > 0.0 else up)
-            share, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], 0.0, p)
+            share, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, p)
             if ball[2] - off > most:
                 most = ball[2] - off
                 out = vec.sub(p, vec.madd(hip, share, vec.sub(knee, hip)))
