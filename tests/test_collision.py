@@ -380,6 +380,7 @@ def test_what_is_left_is_what_the_meshes_say(figure, what):
     """What the mesh says (trimesh) is said, by up to 4.5 cm more for an elbow; and nothing far from it."""
     pytest.importorskip("trimesh")
     pytest.importorskip("rtree")
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
     targets = still_pose(figure, 2, 90, "squatting") if what == "thighs" else crossing(figure, 40)
     from collision_meter import Meter
 
