@@ -1,10 +1,10 @@
-"""Elbows in the trunk, with and without avoidance, measured on the meshes by trimesh.
+"""Elbows in the trunk, thighs in each other, arms in thighs: with and without avoidance, by trimesh.
 
 Nothing of the solver's own description of the trunk is used here: a vertex near an elbow is in the trunk if
 a ray from it crosses the trunk's closed mesh an odd number of times, and as deep as the nearest point of it
 is far.
 
-    python benchmarks/collision.py [--write docs/collision.md] [--frames 1000] [--data FOLDER]
+    python benchmarks/collision.py [--write docs/collision.md] [--only PART ...] [--frames 1000] [--data D]
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
+from collision_meter import Meter
 from marked import rewrite
 from numpy.typing import NDArray
-from reaches import is_within, reach_across, wander_around
-from scipy.spatial.transform import Rotation
+from reaches import reach_across, wander_around
+from seats import KINDS, POSTURES, move_legs, rest_hands
 
 import sixpoint as sp
 from sixpoint.body.flesh import build_shape
@@ -29,95 +29,9 @@ Array = NDArray[np.float64]
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 METHODS = ("sik", "sik+", "sik-prior")
-NEAR = 0.07  # m, of an elbow joint: vertices of the arm that count as its elbow
 DEEP = 0.005  # m, a penetration that counts
 SEEDS = (1, 2, 3, 4, 5, 6)
-
-
-class Meter:
-    """Depth of the elbows in the trunk of a figure with a shape of named parts.
-
-    With ``forearms``, of what is beyond the elbows, hands included, in trunk and head.
-    """
-
-    def __init__(self, figure: sp.Figure, forearms: bool = False) -> None:
-        shape = figure.shape
-        self.figure, self.shape = figure, shape
-        self.bodies = []
-        for part in ("trunk", "head") if forearms else ("trunk",):
-            ids, faces = np.unique(shape.triangles[shape.parts[part]], return_inverse=True)
-            self.bodies.append((ids, faces.reshape(-1, 3)))
-        self.elbows = []
-        positions, world = figure.neutral_pose.compute_transforms()
-        vertices = shape.place(positions, world)
-        for k, side in enumerate("lr"):
-            elbow, wrist = positions[figure.roles.elbow[k]], positions[figure.roles.wrist[k]]
-            arm = np.unique(shape.triangles[shape.parts[f"{side}_arm"]])
-            if forearms:
-                along = (vertices[arm] - elbow) @ (wrist - elbow) / np.linalg.norm(wrist - elbow)
-                hand = np.unique(shape.triangles[shape.parts[f"{side}_hand"]])
-                self.elbows.append(np.concatenate([arm[along > NEAR], hand]))
-            else:
-                self.elbows.append(arm[np.linalg.norm(vertices[arm] - elbow, axis=1) < NEAR])
-
-    def place_bodies(self, vertices: Array) -> list[trimesh.Trimesh]:
-        """The closed meshes in a frame."""
-        return [trimesh.Trimesh(vertices[ids], faces, process=False) for ids, faces in self.bodies]
-
-    def measure(self, motion: sp.Motion, known: tuple[sp.Motion, Array] | None = None) -> Array:
-        """Depth (F, 2) of the left and the right elbow [m], 0 outside.
-
-        Frames posed as in a ``known`` motion are as deep as there.
-        """
-        positions, world = motion.transforms
-        out, frames = np.zeros((len(positions), 2)), np.arange(len(positions))
-        if known is not None:
-            out[:] = known[1]
-            frames = np.flatnonzero((motion.rotations != known[0].rotations).any(axis=(1, 2)))
-            out[frames] = 0.0
-        for f in frames:
-            vertices = self.shape.place(positions[f], world[f])
-            bodies = self.place_bodies(vertices)
-            for side, elbow in enumerate(self.elbows):
-                out[f, side] = max(depth_in(body, vertices[elbow]) for body in bodies)
-        return out
-
-    def find_way_out(self, motion: sp.Motion, frame: int, side: int) -> float:
-        """The least depth of an elbow [m] over all swivel angles within the shoulder's limits, by 5 degrees.
-
-        The wrist stays where it is: the arm turns about the line to it.
-        """
-        figure, joint = self.figure, self.figure.roles.shoulder[side]
-        positions, world = (array[frame] for array in motion.transforms)
-        parent = int(figure.skeleton.parents[joint])
-        above = Rotation.from_quat(world[parent]) * Rotation.from_quat(figure.neutral[parent]).inv()
-        line = positions[figure.roles.wrist[side]] - positions[joint]
-        line /= np.linalg.norm(line)
-        below = figure.skeleton.subtree(joint)
-        vertices = self.shape.place(positions, world)
-        trunk = self.place_bodies(vertices)[0]
-        least = np.inf
-        for angle in np.radians(np.arange(0, 360, 5)):
-            turn = Rotation.from_rotvec(angle * line)
-            own = turn * Rotation.from_quat(world[joint]) * Rotation.from_quat(figure.neutral[joint]).inv()
-            if not is_within(figure.dofs[joint].limit, above.inv() * own) and angle > 0.0:
-                continue
-            moved, turned = positions.copy(), world.copy()
-            moved[below] = positions[joint] + turn.apply(positions[below] - positions[joint])
-            turned[below] = (turn * Rotation.from_quat(world[below])).as_quat()
-            points = self.shape.place(moved, turned)[self.elbows[side]]
-            least = min(least, depth_in(trunk, points))
-            if least == 0.0:
-                break
-        return least
-
-
-def depth_in(mesh: trimesh.Trimesh, points: Array) -> float:
-    """How deep the deepest of points is in a closed mesh [m]; 0 outside."""
-    low, high = mesh.bounds
-    points = points[((points > low) & (points < high)).all(axis=1)]
-    inside = points[mesh.contains(points)] if len(points) else points
-    return float(trimesh.proximity.closest_point(mesh, inside)[1].max()) if len(inside) else 0.0
+PARTS = ("reaches", "wandering", "forearms", "thighs", "arms", "boxing")
 
 
 @dataclass(frozen=True)
@@ -221,7 +135,7 @@ def table(rows: Sequence[Row]) -> str:
 
 def compare_forearms(figure: sp.Figure, method: str, targets: Sequence[sp.Targets]) -> str:
     """A row: frames with forearm or hand in trunk or head, without avoidance, with elbows, with both."""
-    meters, counts, kept = (Meter(figure, forearms=True), Meter(figure)), [], []
+    meters, counts, kept = (Meter(figure, "forearms"), Meter(figure)), [], []
     options = ({}, {"avoid": "elbows"}, {"avoid": ("elbows", "forearms")})
     solvers = [sp.make_solver(method, figure, **more) for more in options]
     found = [[solver.solve_frames(part) for part in targets] for solver in solvers]
@@ -237,6 +151,50 @@ def compare_forearms(figure: sp.Figure, method: str, targets: Sequence[sp.Target
         f"| {kept[2]:.2f} % | x {both / plain:.2f} |"
     )
 
+
+def compare_legs(figure: sp.Figure, name: str, method: str, targets: Sequence[sp.Targets], what: str) -> str:
+    """A row: frames with thighs in each other, or arms in thighs, without and with avoidance of that."""
+    solvers = [sp.make_solver(method, figure, **more) for more in ({}, {"avoid": what})]
+    meter, found = (
+        Meter(figure, what),
+        [[solver.solve_frames(part) for part in targets] for solver in solvers],
+    )
+    plain = [meter.measure(s.motion) for s in found[0]]
+    known = [(s.motion, depth) for s, depth in zip(found[0], plain, strict=True)]
+    clear = [meter.measure(s.motion, k) for s, k in zip(found[1], known, strict=True)]
+    without, with_ = (np.concatenate(depths).max(axis=1) for depths in (plain, clear))
+    ends, middles = (
+        (slice(4, 6), figure.roles.knee) if what == "thighs" else (slice(2, 4), figure.roles.elbow)
+    )
+    misses = [np.concatenate([s.residual[:, ends] for s in of]) for of in found]
+    met = misses[0] < 1e-3
+    steps = [
+        max(np.linalg.norm(np.diff(s.motion.positions[:, [*middles]], axis=0), axis=-1).max() for s in of)
+        for of in found
+    ]
+    left = [(k, f, side) for k, d in enumerate(clear) for f, side in np.argwhere(d > DEEP)]
+    bound = "-"
+    if what == "arms":
+        bound = str(
+            sum(meter.find_way_out(found[1][k].motion, int(f), int(side)) > DEEP for k, f, side in left)
+        )
+    deep = [int((d > DEEP).sum()) for d in (without, with_)]
+    fewer = f"{100 * (1 - deep[1] / deep[0]):.1f} %" if deep[0] else "-"
+    first, second = time_pair(*solvers, targets)
+    return (
+        f"| {name} | `{method}` | {len(without)} | {deep[0]} | {deep[1]} | {fewer} | {len(left)}, {bound} "
+        f"| {1e3 * without.max():.0f} mm | {1e3 * with_.max():.0f} mm "
+        f"| {100 * (misses[1][met] < 1e-3).mean():.2f} % of {met.sum()} "
+        f"| {1e3 * steps[0]:.0f}, {1e3 * steps[1]:.0f} mm | {1e6 * first:.1f} us x {second / first:.2f} |"
+    )
+
+
+LEGS = (
+    "| points | method | frames | deeper than 5 mm | with avoidance | fewer by | sides left, bound by limits "
+    "| deepest | with avoidance | on target without, still within 1 mm "
+    "| largest step of {middle}, without, with | time |\n"
+    "|---|---|---|---|---|---|---|---|---|---|---|---|"
+)
 
 FOREARMS = (
     "| method | frames | forearm or hand deeper than 5 mm | elbows avoided | forearms too "
@@ -255,30 +213,42 @@ def boxing_targets(figure: sp.Figure, folder: Path) -> tuple[sp.Figure, sp.Targe
     return figure, figure.targets(sp.make_sample("boxing", figure)), "the built-in boxing motion"
 
 
+def measure_part(part: str, figure: sp.Figure, frames: int, data: Path) -> str:
+    """A part of the page as Markdown."""
+    if part == "forearms":
+        targets = [reach_across(figure, seed, min(frames, 100)) for seed in SEEDS]
+        return "\n".join([FOREARMS, *(compare_forearms(figure, m, targets) for m in METHODS)])
+    if part in ("thighs", "arms"):
+        make, kinds = (move_legs, KINDS) if part == "thighs" else (rest_hands, POSTURES)
+        rows = [LEGS.format(middle="a knee" if part == "thighs" else "an elbow")]
+        for kind in kinds:
+            targets = [
+                make(figure, seed, min(frames, 500 if part == "thighs" else 180), kind) for seed in SEEDS
+            ]
+            rows += [compare_legs(figure, kind, m, targets, part) for m in METHODS]
+        return "\n".join(rows)
+    if part == "boxing":
+        own, boxing, name = boxing_targets(figure, data)
+        return f"On {name}:\n\n{table([compare(own, m, [boxing], Meter(own)) for m in METHODS])}"
+    make, most = (reach_across, frames) if part == "reaches" else (wander_around, min(frames, 200))
+    targets = [make(figure, seed, most) for seed in SEEDS]
+    return table([compare(figure, m, targets, Meter(figure)) for m in METHODS])
+
+
 def main() -> None:
     """Measure, print, and write into a page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", type=Path)
     parser.add_argument("--frames", type=int, default=1000, help="of each reach; wandering has 200")
+    parser.add_argument("--only", choices=PARTS, nargs="+", default=PARTS)
     parser.add_argument("--data", type=Path, default=DATA)
     options = parser.parse_args()
     plain = sp.Figure.from_stature(1.75)
     figure = plain.with_shape(build_shape(plain))
-    meter, parts = Meter(figure), {}
-    for part, make, frames in (
-        ("reaches", reach_across, options.frames),
-        ("wandering", wander_around, min(options.frames, 200)),
-    ):
-        targets = [make(figure, seed, frames) for seed in SEEDS]
-        parts[part] = table([compare(figure, m, targets, meter) for m in METHODS])
+    parts = {}
+    for part in options.only:
+        parts[part] = measure_part(part, figure, options.frames, options.data)
         print(f"{part}\n\n{parts[part]}\n", flush=True)
-    targets = [reach_across(figure, seed, min(options.frames, 100)) for seed in SEEDS]
-    parts["forearms"] = "\n".join([FOREARMS, *(compare_forearms(figure, m, targets) for m in METHODS)])
-    print(f"forearms\n\n{parts['forearms']}\n", flush=True)
-    own, boxing, name = boxing_targets(figure, options.data)
-    rows = [compare(own, m, [boxing], Meter(own)) for m in METHODS]
-    parts["boxing"] = f"On {name}:\n\n{table(rows)}"
-    print(parts["boxing"])
     if options.write:
         rewrite(options.write, parts)
 

@@ -1,4 +1,4 @@
-"""Elbows stay out of the trunk; what is measured on meshes is measured by trimesh."""
+"""Elbows stay out of the trunk, thighs out of each other; meshes are measured by trimesh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
@@ -21,6 +21,8 @@ from sixpoint.errors import SixpointError
 from sixpoint.solvers.avoidance.clearance import deepest, gap_to_prism
 from sixpoint.solvers.avoidance.options import check_avoid
 from sixpoint.solvers.avoidance.packing import pack_flesh, unpack_flesh
+from sixpoint.solvers.avoidance.penetration import describe_penetration, find_penetration
+from sixpoint.solvers.avoidance.thigh_clearance import gap_of_thighs
 
 METHODS = ("sik", "sik+", "sik-prior")
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -71,7 +73,7 @@ def elliptic(width, depth, radius):
     points = np.stack([width * np.cos(angles), heights, depth * np.sin(angles)], axis=-1).reshape(-1, 3)
     elbow = build_prisms(sp.Figure.from_stature(1.75)).elbow[:1]
     prisms = Prisms((_prism(0, points, 0.3, -0.3, radius),), (replace(elbow[0], radius=radius),), (), radius)
-    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False))
+    return unpack_flesh(pack_flesh(prisms, [0.3, 0.3], False), None, None, None)
 
 
 def signed_distance(width, depth, point):
@@ -137,9 +139,9 @@ def test_what_is_off_changes_no_bit(figure, method):
     plain = sp.make_solver(method, figure).solve_frames(targets)
     off = sp.make_solver(method, figure, avoid=()).solve_frames(targets)
     nothing = sp.make_solver(method, figure, avoid="elbows")
-    thin = nothing._arrays[-1].copy()
+    thin = nothing._arrays[-2].copy()
     thin[:-1, 2:4] += 100.0
-    nothing._arrays = (*nothing._arrays[:-1], thin)
+    nothing._arrays = (*nothing._arrays[:-2], thin, None)
     for other in (off, nothing.solve_frames(targets)):
         assert np.array_equal(plain.motion.rotations, other.motion.rotations)
         assert np.array_equal(plain.residual, other.residual)
@@ -218,7 +220,7 @@ def test_no_input_breaks_it(values, method, limits):
     """Any points, any gaps: a finite pose of unit quaternions."""
     figure = sp.Figure.from_stature(1.75)
     points = np.array(values).reshape(2, 6, 3)
-    solver = sp.make_solver(method, figure, limits=limits, avoid=("elbows", "forearms"))
+    solver = sp.make_solver(method, figure, limits=limits, avoid=("elbows", "forearms", "thighs", "arms"))
     motion = solver.solve_motion(sp.Targets(points, 60.0))
     assert np.allclose(np.linalg.norm(motion.rotations, axis=-1), 1.0, atol=1e-6)
     assert np.all(np.isfinite(motion.positions))
@@ -269,3 +271,139 @@ def test_the_job_avoids_with_the_built_in_surface():
     fleshy = figure.with_shape(build_shape(figure))
     wanted = sp.SequentialIK(fleshy, avoid="elbows").solve_motion(targets)
     assert np.array_equal(found.rotations, wanted.rotations)
+
+
+def still_pose(figure, seed, frames=90, kind="crossed"):
+    """Seeded legs, see ``benchmarks/seats.py``."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+    import seats
+
+    return seats.move_legs(figure, seed, frames, kind)
+
+
+def least_gap(a, b, c, d, radii):
+    """Least gap of two tapered capsules a-b and c-d beyond a quarter of their length. By SciPy."""
+
+    def gap(x):
+        s, t = x
+        off = np.linalg.norm(a + s * (b - a) - c - t * (d - c))
+        return off - sum(radii[0] + k * (radii[1] - radii[0]) for k in (s, t))
+
+    starts = [(s, t) for s in (0.4, 0.9) for t in (0.4, 0.9)]
+    return min(minimize(gap, x, bounds=[(0.25, 1.0)] * 2).fun for x in starts)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_gap_of_thighs_is_that_of_tapered_capsules(seed):
+    """The least distance of the axes less the radii there; never less, seldom more by a millimetre."""
+    rng, radii = np.random.default_rng(seed), (0.1, 0.06)
+    off = []
+    for _ in range(15):
+        hips = np.array([[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]])
+        aims = rng.normal([0.0, -0.7, 0.7], 0.4, (2, 3))
+        knees = hips + 0.42 * aims / np.linalg.norm(aims, axis=1)[:, None]
+        placed = np.zeros((4, 4))
+        placed[:, :3] = [hips[0], knees[0], hips[1], knees[1]]
+        off.append(gap_of_thighs(placed, *radii) - least_gap(hips[0], knees[0], hips[1], knees[1], radii))
+    assert min(off) > -1e-4 and np.quantile(off, 0.9) < 1e-3 and max(off) < 0.02
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_thighs_part_and_ankles_stay(figure, method):
+    """Thighs leave each other's mesh (trimesh); ankles stay where they were, knees do not jump."""
+    pytest.importorskip("trimesh")
+    pytest.importorskip("rtree")
+    targets = [still_pose(figure, 2, 90, "squatting"), still_pose(figure, 2)]
+    from collision_meter import Meter
+
+    meter = Meter(figure, "thighs")
+    deep = [0, 0]
+    for part in targets:
+        plain, clear = (sp.make_solver(method, figure, avoid=a).solve_frames(part) for a in ((), "thighs"))
+        met = (plain.residual[:, 4:] < 1e-3).all(axis=1)
+        for k, found in enumerate((plain, clear)):
+            deep[k] += int((meter.measure(found.motion).max(axis=1)[met] > 0.005).sum())
+        ankles = list(figure.roles.ankle)
+        assert np.allclose(plain.motion.positions[:, ankles], clear.motion.positions[:, ankles], atol=1e-6)
+        knees = clear.motion.positions[:, list(figure.roles.knee)]
+        if method != "sik":
+            assert np.linalg.norm(np.diff(knees, axis=0), axis=-1).max() < 0.15
+    assert deep[1] <= 0.05 * deep[0]
+    if method == "sik+":
+        assert deep[0] >= 5
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_hips_stay_within_limits(figure, method):
+    """Parted legs have hips within their swing and twist limits (SciPy)."""
+    motion = sp.make_solver(method, figure, avoid="thighs").solve_motion(still_pose(figure, 2))
+    from reaches import is_within
+
+    anatomical = rot.mul(motion.transforms[1], rot.inv(figure.neutral))
+    for joint in figure.roles.hip:
+        local = rot.mul(rot.inv(anatomical[:, figure.skeleton.parents[joint]]), anatomical[:, joint])
+        wide = replace(figure.dofs[joint].limit, twist=figure.dofs[joint].limit.twist + [-1e-4, 1e-4])
+        assert all(is_within(wide, Rotation.from_quat(q)) for q in local)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_thighs_and_arms_cost_nothing_where_they_are_not_in_the_way(figure, method):
+    """On boxing, where no thigh is near anything, all of it changes no bit beside elbows and forearms."""
+    targets = figure.targets(sp.make_sample("boxing", figure)).sliced(slice(0, 60))
+    one = sp.make_solver(method, figure, avoid=("elbows", "forearms")).solve_frames(targets)
+    two = sp.make_solver(method, figure, avoid=("elbows", "forearms", "thighs", "arms")).solve_frames(targets)
+    assert np.array_equal(one.motion.rotations, two.motion.rotations)
+
+
+def test_a_mirrored_crossing_is_the_mirror_image(figure):
+    """Left and right legs are treated alike."""
+    targets = still_pose(figure, 3)
+    other = replace(targets, positions=(targets.positions * MIRROR)[:, OTHER])
+    solver = sp.SequentialIKPlus(figure, avoid=("thighs", "arms"))
+    one, two = (solver.solve_motion(t).positions[:, list(figure.roles.knee)] for t in (targets, other))
+    assert np.allclose(one * MIRROR, two[:, ::-1], atol=1e-3)
+
+
+@pytest.mark.parametrize("method", ["sik+", "sik-prior"])
+def test_frame_by_frame_is_as_at_once(figure, method):
+    """What avoidance remembers is in the solution's state."""
+    targets = crossing(figure, 40)
+    solver = sp.make_solver(method, figure, avoid=("elbows", "thighs", "arms"))
+    whole, last = solver.solve_motion(targets), None
+    for f in range(40):
+        last = solver.solve(targets.positions[f], last, 1 / 60)
+        assert np.allclose(last.pose.rotations, whole.rotations[f], atol=1e-9)
+
+
+@pytest.mark.parametrize("what", ["elbows", "thighs"])
+def test_what_is_left_is_what_the_meshes_say(figure, what):
+    """What the mesh says (trimesh) is said, by up to 4.5 cm more for an elbow; and nothing far from it."""
+    pytest.importorskip("trimesh")
+    pytest.importorskip("rtree")
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+    targets = still_pose(figure, 2, 90, "squatting") if what == "thighs" else crossing(figure, 40)
+    from collision_meter import Meter
+
+    motion = sp.make_solver("sik+" if what == "thighs" else "sik", figure).solve_motion(targets)
+    found = find_penetration(figure, motion, what)[what].max(axis=1)
+    wanted = Meter(figure, what).measure(motion).max(axis=1)
+    assert (wanted > 0.005).sum() >= 10
+    assert np.all(found > wanted - 0.005)
+    assert np.quantile(found - wanted, 0.9) < 0.045
+    assert (found[wanted == 0.0] == 0.0).mean() > 0.6
+    assert describe_penetration({what: found[:, None]})[0].startswith(what)
+
+
+def test_penetration_needs_the_figure_that_was_posed(figure):
+    """Another rig's motion is refused; a body at rest has nothing inside."""
+    rest = sp.Motion.from_poses([figure.neutral_pose] * 2, 60.0)
+    assert all(depth.max() < 0.01 for depth in find_penetration(figure, rest).values())
+    assert describe_penetration(find_penetration(figure, rest, "thighs")) == ["no thighs in each other"]
+    with pytest.raises(SixpointError, match="other rig"):
+        find_penetration(figure, sp.Motion.from_poses([puppet_pose()] * 2, 60.0))
+
+
+def puppet_pose():
+    """A pose of a rig of three joints."""
+    skeleton = sp.Skeleton(("a", "b", "c"), [-1, 0, 1], np.zeros((3, 3)))
+    return sp.Pose(skeleton, np.tile(rot.IDENTITY, (3, 1)), np.zeros((1, 3)))

@@ -19,12 +19,17 @@ SPACING = 0.012  # m, between points of a surface
 TRUNK, NECK, HEAD, UPPER, LOWER, HAND, THIGH, SHANK, FOOT = range(9)
 SHARE = 0.995  # of the vertices around a bone that its radius encloses
 
-# A trunk without a shape, from the hips (0) to the shoulders (1), for a height of 1.6 m: half width over
-# that of hips or shoulders and half depth [m]. Rounded proportions of a lean adult.
+# A trunk without a shape, from the hips (0) over the waist to the shoulders (1): half widths and half depth
+# of elliptic cylinders as shares of the figure's height; at the shoulders about 3/4 of half their width.
 HEIGHTS = (0.0, 0.45, 0.8, 1.0)
-WIDTHS = ((1.75, 0.0), (0.75, 0.35), (0.0, 0.76), (0.0, 0.72))
-DEPTHS = (0.105, 0.095, 0.108, 0.085)
-ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))
+WIDTHS = (0.09, 0.075, 0.09, 0.09)
+DEPTH = 0.06
+ELBOW = 0.045  # m, radius of an elbow without a shape, for a height of 1.6 m
+ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))  # m, likewise
+THIGH_RADII = (0.092, 0.06)  # at hip and knee, for a height of 1.6 m [m]
+ENCLOSED = 0.9  # of the vertices of a thigh that its radii enclose
+NEAR_HIP = 0.25  # share of a thigh above which another one cannot be kept away: hips stand still
+BESIDE = 2e-3  # m, half of the least gap between neutral thighs
 
 
 def parts_of_joints(figure: Figure) -> Index:
@@ -101,13 +106,11 @@ def bare_trunk(figure: Figure, head: bool) -> Array:
     hips, shoulders = rest[list(roles.hip)], rest[list(roles.shoulder)]
     low, high = hips[:, 1].mean() - 0.05 * unit, shoulders[:, 1].mean() + 0.03 * unit
     middle = np.array([hips.mean(axis=0), shoulders.mean(axis=0)])
-    halves = 0.5 * np.abs([hips[0, 0] - hips[1, 0], shoulders[0, 0] - shoulders[1, 0]])
-    widths = np.array(WIDTHS) @ halves
     angles = np.linspace(0.0, 2.0 * np.pi, 96, endpoint=False)
     rings = []
     for y in np.arange(low, high + SPACING, SPACING):
         t = (min(y, high) - low) / (high - low)
-        width, depth = np.interp(t, HEIGHTS, widths), np.interp(t, HEIGHTS, DEPTHS) * unit
+        width, depth = np.interp(t, HEIGHTS, WIDTHS) * figure.height, DEPTH * figure.height
         centre = middle[0] + t * (middle[1] - middle[0])
         x, z = centre[0] + width * np.cos(angles), centre[2] + depth * np.sin(angles)
         rings.append(np.column_stack([x, np.full_like(x, min(y, high)), z]))
@@ -144,7 +147,7 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
     roles, unit = figure.roles, figure.height / HEIGHT
     lower = float(np.linalg.norm(figure.offset_between(roles.elbow[0], roles.wrist[0])))
     part = (LOWER if along <= lower else HAND) if forearm else UPPER
-    bare = dict(ARM_RADII)[part] * unit
+    bare = (ELBOW if forearm and along == 0.0 else dict(ARM_RADII)[part]) * unit
     if figure.shape is None:
         return bare
     vertices, parts = neutral_surface(figure)
@@ -160,3 +163,37 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
             off = np.linalg.norm(arm[near] - t[near, None] * axis, axis=1)
             widest = max(widest, float(np.quantile(off, SHARE)))
     return widest if 0.0 < widest < 3.0 * bare else bare
+
+
+def thigh_radii(figure: Figure) -> tuple[float, float]:
+    """Radii of the thighs at hip and knee [m]: a straight course that encloses most of both thighs' flesh.
+
+    Thighs that touch in the neutral pose are narrower here, by half of what they would share a quarter of
+    their length below the hips or at the knees: else they could never be beside each other.
+    """
+    roles, rest, unit = figure.roles, figure.rest_positions, figure.height / HEIGHT
+    radii = np.array(THIGH_RADII) * unit
+    if figure.shape is not None:
+        vertices, parts = neutral_surface(figure)
+        places, widths = [], []
+        for k in range(2):
+            hip, knee = rest[[roles.hip[k], roles.knee[k]]]
+            thigh = vertices[np.isin(parts, np.array([THIGH, SHANK]) + 16 * k)] - hip
+            share = thigh @ (knee - hip) / max(float((knee - hip) @ (knee - hip)), 1e-12)
+            near = (share > 0.1) & (share < 1.05)
+            places.append(share[near])
+            widths.append(np.linalg.norm(thigh[near] - share[near, None] * (knee - hip), axis=1))
+        x, y = np.concatenate(places), np.concatenate(widths)
+        if len(x) >= 8 and np.ptp(x) > 0.5:
+            slope, start = np.polyfit(x, y, 1)
+            start += np.quantile(y - start - slope * x, ENCLOSED)
+            found = np.array([start, start + slope])
+            if np.all((found > radii / 3.0) & (found < radii * 3.0)):
+                radii = found
+    room = 0.5 * np.linalg.norm(
+        rest[[roles.hip[0], roles.knee[0]]] - rest[[roles.hip[1], roles.knee[1]]], axis=1
+    )
+    high, low = radii[0] + NEAR_HIP * (radii[1] - radii[0]), radii[1]
+    high = min(high, room[0] + NEAR_HIP * (room[1] - room[0]) - BESIDE)
+    low = min(low, room[1] - BESIDE)
+    return float(high + (high - low) * NEAR_HIP / (1.0 - NEAR_HIP)), float(low)

@@ -17,6 +17,7 @@ from sixpoint.errors import listed
 from sixpoint.jobs.info import MotionInfo
 from sixpoint.jobs.reading import Opened
 from sixpoint.jobs.solving import Solved
+from sixpoint.solvers.avoidance.penetration import describe_penetration
 from sixpoint.solvers.base import Status
 from sixpoint.study.metrics import Errors
 
@@ -104,6 +105,8 @@ def describe_solved(solved: Solved, targets: Targets) -> list[Row]:
     rows = [("effectors", met), ("frames", frames_met(solved))]
     if lost.any():
         rows.append(("lost points", _shares(lost)))
+    if solved.inside:
+        rows.append(("inside", "; ".join(describe_penetration(solved.inside))))
     return [*rows, ("speed", f"{microseconds(solved)} us per frame")]
 
 

@@ -76,8 +76,8 @@ def reconstruct(
     avoid: Annotated[
         str | None,
         Parameter(
-            help="Keep `elbows` out of the trunk, or `elbows,forearms`: hands too, and out of the head. With "
-            "sik, sik+ and sik-prior."
+            help="Keep apart, of elbows,forearms,thighs,arms: elbows and trunk; forearms with hands "
+            "and trunk with head; both thighs; arms and thighs. With sik, sik+ and sik-prior."
         ),
     ] = None,
     limits: LimitsFile = None,

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.flesh import build_shape
@@ -13,6 +16,7 @@ from sixpoint.body.limits import Limits
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, listed
 from sixpoint.jobs.progress import Progress, silent
+from sixpoint.solvers.avoidance.penetration import find_penetration
 from sixpoint.solvers.base import MotionSolution
 from sixpoint.solvers.registry import DEFAULT, find_options, find_solver, make_solver, methods_with
 
@@ -28,8 +32,8 @@ class Solving:
         limits: Keep joints within their limits.
         limits_file: A table of joint limits in place of the shipped one.
         rotations: Effectors whose measured rotations are used; none by default.
-        avoid: Parts of the arms that stay out of the trunk, "elbows" or "forearms"; a figure without a
-            surface has the built-in one then.
+        avoid: What is kept apart, of "elbows", "forearms", "thighs" and "arms"; a figure without a surface
+            has the built-in one then.
     """
 
     method: str = DEFAULT
@@ -125,10 +129,13 @@ class Solved:
     Attributes:
         solution: Postures, status and residual of each frame.
         seconds: Time per frame, kernels compiled [s].
+        inside: How deep what was to be kept apart still is, see ``find_penetration`` [m]; empty where nothing
+            was.
     """
 
     solution: MotionSolution
     seconds: float
+    inside: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def solve(figure: Figure, targets: Targets, solving: Solving, progress: Progress = silent) -> Solved:
@@ -140,4 +147,6 @@ def solve(figure: Figure, targets: Targets, solving: Solving, progress: Progress
     solver.solve_frames(targets.sliced(slice(0, 1)))  # arrays of the kind that follow
     start = time.perf_counter()
     solution = solver.solve_frames(targets, lambda done: progress("solving", done, len(targets)))
-    return Solved(solution, (time.perf_counter() - start) / len(targets))
+    seconds = (time.perf_counter() - start) / len(targets)
+    inside = find_penetration(figure, solution.motion, solving.avoid) if solving.avoid else {}
+    return Solved(solution, seconds, inside)

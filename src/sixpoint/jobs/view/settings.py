@@ -21,6 +21,12 @@ FIXED = ("flext", "step")
 WEIGHTS = (("w1", "wrists"), ("w2", "ankles"), ("w3", "memory"))
 RANGES = {"damping": (0.01, 0.5), "reach": (0.02, 0.5), "twist_weight": (0.0, 5.0), "iterations": (1, 20)}
 TURN, AVOID = "turn ", "avoid "
+HINTS = {
+    "elbows": "Elbows out of the trunk",
+    "forearms": "Forearms and hands out of trunk and head",
+    "thighs": "Thighs out of each other",
+    "arms": "Arms out of the thighs, elbows out of the trunk",
+}
 """Before an effector: whether its rotation is used. Before a part: whether it stays out of the trunk."""
 
 
@@ -71,8 +77,7 @@ def _describe(name: str, parameter: inspect.Parameter) -> list[Setting]:
         hint = "Use its rotation too: its handle gets rings"
         return [Setting(TURN + at, at, False, None, hint, "Rotations") for at in EFFECTORS]
     if name == "avoid":
-        hint = "Keep it out of the trunk"
-        return [Setting(AVOID + part, part, False, None, hint, "Out of the trunk") for part in AVOIDABLE]
+        return [Setting(AVOID + part, part, False, None, HINTS[part], "Keep apart") for part in AVOIDABLE]
     label = name.replace("_", " ")
     if isinstance(default, bool):
         return [Setting(name, label, default)]

@@ -18,6 +18,7 @@ from sixpoint.solvers.avoidance.packing import (
     SLICES,
     SPREAD,
 )
+from sixpoint.solvers.avoidance.thigh_clearance import beside_thighs, or_in_thighs
 
 OUTSIDE = 1.0  # m, how far is said of what is beside or above all prisms
 LAST = 32.0 - 1e-9
@@ -74,7 +75,7 @@ def gap_to_trunk(flesh, root, world, segs, p):
 
 @helper
 def gap_of_arm(flesh, root, world, segs, shoulder, elbow, wrist):
-    """The least distance of an arm's balls from the trunk; negative inside [m].
+    """The least distance of an arm's balls from the trunk, and from thighs if asked for; negative inside [m].
 
     Of what the wrist, which is where it has to be, is inside, a ball's share of the forearm counts as none.
     """
@@ -99,7 +100,7 @@ def gap_of_arm(flesh, root, world, segs, shoulder, elbow, wrist):
             if forearm:
                 gap -= share * wrist_gap
             least = min(least, gap)
-    return least
+    return beside_thighs(flesh.thighs, flesh.placed, elbow, up, down, least)
 
 
 @helper
@@ -138,10 +139,13 @@ def way_out(row, p):
 
 @helper
 def deepest(flesh, root, world, segs, shoulder, elbow, wrist):
-    """The ball of an arm that is deepest in the trunk, along rays from the outlines' centres.
+    """The ball of an arm that is deepest in the trunk, along rays from the outlines' centres, or in a thigh.
 
     Returns its depth, straight out [m], its centre, and where that should be. Depth is 0, and both points are
     the elbow, where all are outside.
+
+    The paper measures along the line through the elbow joint to the outer vertex of the segment, in the same
+    plane; ours goes the nearest way to the outline, as the elbow need not face the vertex that is outermost.
     """
     count, spread = int(flesh.arms[0]), flesh.arms[SPREAD]
     most, smaller, place = 0.0, 0.0, root
@@ -162,9 +166,10 @@ def deepest(flesh, root, world, segs, shoulder, elbow, wrist):
             if depth > most:
                 most, smaller, prism, centre, turn, origin = depth, flesh.arms[b + 2], k, ball, q, here
     if prism < 0:
-        return 0.0, elbow, elbow
+        return or_in_thighs(flesh.thighs, flesh.placed, elbow, up, down, (0.0, elbow, elbow))
     out = vec.sub(way_out(flesh.prisms[prism], centre), centre)
     length = vec.norm(out)
     p_e = vec.add(origin, qt.mul_vec(turn, centre))
     depth = max(length - smaller, 0.0)
-    return depth, p_e, vec.madd(p_e, depth / max(length, 1e-12), qt.mul_vec(turn, out))
+    p_t = vec.madd(p_e, depth / max(length, 1e-12), qt.mul_vec(turn, out))
+    return or_in_thighs(flesh.thighs, flesh.placed, elbow, up, down, (depth, p_e, p_t))

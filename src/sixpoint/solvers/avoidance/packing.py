@@ -5,6 +5,10 @@ the grown outlines (7, 33) as |x| + |z| of their points, see ``body.prisms.direc
 first. The arms' row: number of balls, how far
 from the elbow the farthest is [m], then per ball 1 for the line elbow-wrist or 0 for elbow-shoulder, the
 share of it, and by how much the ball is smaller than the radius by which outlines are grown [m].
+
+Thighs cross in a second array of rows of four, or as None where nothing stays out of them: radius at hip and
+knee [m], number of the arms' balls, and 1 if thighs stay out of each other; how far from the elbow the
+farthest ball is [m], and the radius at the wrist [m]; then per ball as above, with its radius [m].
 """
 
 from typing import NamedTuple
@@ -21,6 +25,8 @@ RING = DIRECTIONS + 1
 WIDTH = HEADER + SLICES * RING
 BALL = 3
 SPREAD, FIRST_BALL = 1, 2
+THIGH_HEADER = 2
+PALM = 0.02  # m, half of a hand that lies flat on a thigh, as hands mostly do
 
 
 class Flesh(NamedTuple):
@@ -29,10 +35,17 @@ class Flesh(NamedTuple):
     Attributes:
         prisms: (P, W) rows of prisms; joint k of the trunk has row k.
         arms: (W,) balls of an arm.
+        thighs: (2 + B, 4) thighs and balls that stay out of them, or None.
+        placed: (4, 4) left hip and knee, right hip and knee in the world [m]; beside the hips, the swivel
+            angle of the last frame from the knee as it was posed in this one [rad].
+        memory: The solver's memory; the clavicles' angles are beside its rows 2 and 3 [rad].
     """
 
     prisms: np.ndarray
     arms: np.ndarray
+    thighs: np.ndarray
+    placed: np.ndarray
+    memory: np.ndarray
 
 
 def pack_flesh(prisms, lengths, forearms):
@@ -56,8 +69,28 @@ def pack_flesh(prisms, lengths, forearms):
     return table
 
 
+def pack_thighs(radii, balls, lengths, apart):
+    """Thighs of a figure as an array (2 + B, 4).
+
+    Args:
+        radii: At hip and knee [m].
+        balls: Of an arm, see ``body.prisms``; none where arms may touch thighs.
+        lengths: Of upper arm and forearm [m].
+        apart: Whether thighs stay out of each other.
+    """
+    table = np.zeros((THIGH_HEADER + len(balls), 4))
+    table[0] = *radii, len(balls), apart
+    if balls:
+        wrist = min((b for b in balls if b.forearm), key=lambda ball: abs(ball.share - 1.0))
+        table[1, :2] = max(ball.share * lengths[ball.forearm] for ball in balls), min(wrist.radius, PALM)
+        table[THIGH_HEADER:, :3] = [
+            (b.forearm, b.share, min(b.radius, PALM) if b.share >= 1.0 else b.radius) for b in balls
+        ]
+    return table
+
+
 @helper
-def unpack_flesh(table):
-    """The flesh as slices."""
+def unpack_flesh(table, thighs, placed, memory):
+    """The flesh as slices; ``placed`` is working memory (4, 4)."""
     last = table.shape[0] - 1
-    return Flesh(table[:last], table[last])
+    return Flesh(table[:last], table[last], thighs, placed, memory)

@@ -10,15 +10,28 @@ from sixpoint.solvers.six_points.packing import unpack_model
 
 @entry
 def solve_sequential_clear(
-    table, integers, balls, chords, flesh, work, options, points, state, rotations, pelvis, outcome, residual
+    table,
+    integers,
+    balls,
+    chords,
+    flesh,
+    thighs,
+    work,
+    options,
+    points,
+    state,
+    rotations,
+    pelvis,
+    outcome,
+    residual,
 ):
-    """Solve F frames with elbows out of the trunk; ``flesh`` as in ``avoidance.packing``."""
+    """Solve F frames with elbows out of the trunk; ``flesh`` and ``thighs`` as in ``avoidance.packing``."""
     model = unpack_model(table, integers, balls, chords)
     settings = unpack_settings(options)
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh)
+    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(model, settings, points[f], trunk, local, memory, residual[f], scratch)
         outcome[f, 1] = 1

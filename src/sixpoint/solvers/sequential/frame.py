@@ -3,15 +3,16 @@
 Reference: Unzueta et al. 2008, Algorithm 1.
 """
 
-from math import atan2, cos, sin
+from math import atan2, cos, pi, sin
 
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper, specialised
 from sixpoint.solvers.avoidance.elbow import clear_arm, make_arm
+from sixpoint.solvers.avoidance.thighs import part_thighs
 from sixpoint.solvers.sequential import spine
 from sixpoint.solvers.sequential.clavicle import solve_clavicle
-from sixpoint.solvers.sequential.limb import solve_limb
+from sixpoint.solvers.sequential.limb import place_leg, solve_limb
 from sixpoint.solvers.sequential.packing import unpack_settings, unpack_work
 from sixpoint.solvers.six_points.frame import (
     MEMORY_ROWS,
@@ -87,13 +88,6 @@ def solve_trunk(
 
 
 @helper
-def place_leg(hips, side, root, world):
-    """World rotation of a hip's parent, and where the hip is."""
-    frame = qt.load(world, 0)
-    return frame, vec.add(root, qt.mul_vec(frame, vec.load(hips, side)))
-
-
-@helper
 def place_arm(chest, girdle, clavicles, limbs, balls, limits, hold, side, root, target, world, segs, local):
     """Pose a clavicle; returns the world rotation of the shoulder's parent, and where the shoulder is."""
     row = segs.shape[0] + side
@@ -119,7 +113,7 @@ def place_arm(chest, girdle, clavicles, limbs, balls, limits, hold, side, root, 
 @helper
 def pose_trunk(model, settings, points, local, memory, residual, scratch):
     """Pelvis and spine of a frame; returns whether a point is lost, and where the pelvis is."""
-    world, segs, start, flat, filled = scratch
+    world, segs, start, flat, filled, _ = scratch
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, y = estimate_pelvis(filled, memory, settings.w1, settings.w2, settings.w3)
     root = solve_trunk(
@@ -174,11 +168,26 @@ def place_limb(model, limits, hold, limb, root, target, local, world, segs):
 def solve_frame(model, settings, points, flesh, local, memory, residual, scratch):
     """Solve one frame; updates ``local``, ``memory``, ``residual`` (6,) [m] in place; returns the status.
 
-    ``flesh`` is what elbows stay out of, or None: the compiler then leaves that out.
+    ``flesh`` is what arms stay out of, or None: the compiler then leaves that out.
     """
     lost, root = pose_trunk(model, settings, points, local, memory, residual, scratch)
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
-    for limb in range(4):  # arms, then legs; neither depends on the other
+    for k in range(4):
+        limb = (k + 2) % 4  # legs, then arms, which may have to stay out of the thighs
+        if flesh is not None:
+            if limb == 0:
+                part_thighs(
+                    flesh.thighs,
+                    flesh.placed,
+                    model,
+                    settings.limits,
+                    root,
+                    filled,
+                    local,
+                    world,
+                    residual,
+                    pi,
+                )
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
             continue

@@ -23,6 +23,13 @@ def point_at(u):
 
 
 @helper
+def place_leg(hips, side, root, world):
+    """World rotation of a hip's parent, and where the hip is."""
+    frame = qt.load(world, 0)
+    return frame, vec.add(root, qt.mul_vec(frame, vec.load(hips, side)))
+
+
+@helper
 def solve_limb(target, l1, l2, h, limits, balls, ball, flexion_low, flexion_high):
     """Pose one limb.
 

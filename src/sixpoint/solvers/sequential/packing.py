@@ -28,6 +28,7 @@ class Scratch(NamedTuple):
         start: (S, 4) local rotations to bend from.
         flat: (S, 4) two components of the segments in the bending plane [m].
         filled: (6, 4) effector positions with the lost ones filled in [m], and 1 for a known point, else 0.
+        thighs: (4, 4) where hips and knees are, see ``avoidance.packing``.
     """
 
     world: np.ndarray
@@ -35,6 +36,7 @@ class Scratch(NamedTuple):
     start: np.ndarray
     flat: np.ndarray
     filled: np.ndarray
+    thighs: np.ndarray
 
 
 @helper
@@ -53,10 +55,18 @@ def unpack_settings(options):
 
 def work_rows(segments):
     """Rows of working memory for a trunk of so many segments."""
-    return 4 * segments + 6
+    return 4 * segments + 10
 
 
 @helper
 def unpack_work(work, s):
     """Working memory as slices."""
-    return Scratch(work[:s], work[s : 2 * s], work[2 * s : 3 * s], work[3 * s : 4 * s], work[4 * s :])
+    filled = 4 * s
+    return Scratch(
+        work[:s],
+        work[s : 2 * s],
+        work[2 * s : 3 * s],
+        work[3 * s : filled],
+        work[filled : filled + 6],
+        work[filled + 6 :],
+    )

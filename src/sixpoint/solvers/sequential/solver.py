@@ -38,8 +38,9 @@ class SequentialIK(SixPointSolver):
         align_pelvis: Twist the trunk about the line pelvis-head after it is placed, so that the pelvis'
             X axis is as near as possible to its estimate (not in the paper).
         avoid: "elbows" keeps elbows out of the trunk (the paper's section 8), by the figure's shape or,
-            without one, by elliptic cylinders; "forearms" also forearms and hands, out of trunk and head.
-            Wrists stay on their targets; nothing is avoided by default.
+            without one, by elliptic cylinders; "forearms" also forearms and hands, out of trunk and head;
+            "thighs" thighs out of each other; "arms" elbows, forearms and hands out of the thighs, and elbows
+            out of the trunk. Wrists and ankles stay on their targets; nothing is avoided by default.
 
     Raises:
         SixpointError: An option has an impossible value.
@@ -66,9 +67,9 @@ class SequentialIK(SixPointSolver):
         super().__init__(figure, weights=weights, limits=limits)
         self._switches = (search == "literal", clavicles == "hold", bool(align_pelvis))
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+    def _lower(self, model: Model) -> tuple[NDArray[Any] | None, ...]:
         flesh = find_flesh(self.figure, self.figure.spine_chain, self.avoid)
-        return (*super()._lower(model), *(() if flesh is None else (flesh,)))
+        return (*super()._lower(model), *(flesh or ()))
 
     def _entry_of(self, beside: tuple[Array, ...]) -> Callable[..., None]:
         return solve_sequential_clear if self.avoid else type(self)._entry

@@ -16,6 +16,7 @@ def solve_plus_clear(
     balls,
     chords,
     flesh,
+    thighs,
     work,
     options,
     points,
@@ -26,13 +27,13 @@ def solve_plus_clear(
     outcome,
     residual,
 ):
-    """Solve F frames; ``flesh`` as in ``avoidance.packing``, the others as of ``solve_plus``."""
+    """Solve F frames; ``flesh`` and ``thighs`` as in ``avoidance.packing``, others as of ``solve_plus``."""
     model = unpack_model(table, integers, balls, chords)
     s = unpack_settings(options)
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh)
+    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(
             model, s, points[f], turned[f], trunk, local, memory, residual[f], scratch
@@ -48,6 +49,7 @@ def solve_from_start_clear(
     balls,
     chords,
     flesh,
+    thighs,
     work,
     options,
     points,
@@ -65,7 +67,7 @@ def solve_from_start_clear(
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh)
+    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame_from(
             model, s, points[f], turned[f], given[f], trunk, local, memory, residual[f], scratch

@@ -9,17 +9,16 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper, specialised
 from sixpoint.kernels.swing_twist import clamp
-from sixpoint.solvers.avoidance.elbow import clear_arm_steadily, make_arm
 from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
 from sixpoint.solvers.sequential.spine import chord_of, place_trunk
-from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
-from sixpoint.solvers.sequential_plus.measured import is_measured, lean_to_head, pole_of_end, turn_end
+from sixpoint.solvers.sequential_plus.limb_step import part_legs, point_limb, pole_of_start, pose_limb
+from sixpoint.solvers.sequential_plus.measured import is_measured, lean_to_head, turn_end
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
 from sixpoint.solvers.sequential_plus.pelvis import estimate_pelvis, keep_leaning
 from sixpoint.solvers.sequential_plus.trunk import bend_spine, close_trunk, twist_to_wrists
-from sixpoint.solvers.six_points.frame import MEMORY_ROWS, end_limb, fill_lost, judge, write_frame
-from sixpoint.solvers.six_points.packing import end_row, limb_row, unpack_model
+from sixpoint.solvers.six_points.frame import MEMORY_ROWS, fill_lost, judge, write_frame
+from sixpoint.solvers.six_points.packing import end_row, unpack_model
 
 TWIST = 0.8  # rad, largest twist of the thorax
 DAMPING = 1e-5  # m^2, of the trunk's Newton steps
@@ -123,85 +122,6 @@ def end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, re
     return root
 
 
-@helper
-def point_limb(s, limb, n, frame, turned):
-    """Direction of elbow or knee in the frame of what carries the limb; ``n`` is the limb's line there."""
-    side = 1.0 if limb % 2 == 0 else -1.0
-    if limb < 2:
-        pole = arm_pole(side, n, s.elbow_out, s.elbow_down, s.elbow_back, s.elbow_lift)
-    else:
-        pole = leg_pole(side, s.knee_out)
-    if not is_measured(turned, limb + 2):
-        return pole
-    end = qt.inv_mul(frame, qt.load(turned, limb + 2))
-    if limb < 2:
-        return pole_of_end(n, pole, end, side, s.elbow_hand, s.elbow_palm, s.elbow_grip, s.elbow_tilt)
-    return pole_of_end(n, pole, end, side, s.knee_shank, s.knee_toes, 0.0, s.knee_tilt)
-
-
-@helper
-def pole_of_start(given, limb, n, frame):
-    """Direction of elbow or knee in a given pose, for a limb along ``n`` in ``frame``."""
-    x = qt.x_axis(qt.inv_mul(frame, qt.load(given, given.shape[0] - 4 + limb)))
-    return vec.scale(-1.0 if limb < 2 else 1.0, vec.cross(n, x))
-
-
-@specialised
-def pose_limb(
-    model, s, limb, target, frame, place, pole, turned, began, flesh, root, scratch, local, residual
-):
-    """A limb whose middle joint points to ``pole``, and its extremity.
-
-    ``flesh`` is what elbows stay out of, or None: the compiler then leaves that out.
-    """
-    count = model.segments.shape[0]
-    row = limb_row(count, limb)
-    aim = qt.inv_mul_vec(frame, vec.sub(target, place))
-    was, bent = qt.load(local, row), qt.load(local, row + 2)
-    upper, hinge, end = solve_by_pole(
-        aim,
-        model.limbs[limb, 0],
-        model.limbs[limb, 1],
-        -1.0 if limb < 2 else 1.0,
-        pole,
-        began,
-        was,
-        bent,
-        s.swivel_lag,
-        s.swivel_memory,
-        s.swivel_speed,
-        s.dt,
-        s.limits,
-        model.balls,
-        row,
-        model.limbs[limb, 2],
-        model.limbs[limb, 3],
-    )
-    if flesh is not None:
-        if limb < 2:
-            arm = make_arm(model, limb, place, frame, aim, s.limits)
-            most = s.swivel_speed * s.dt
-            upper, hinge, end = clear_arm_steadily(
-                arm,
-                flesh,
-                root,
-                scratch.world,
-                scratch.segs,
-                model.balls,
-                upper,
-                hinge,
-                end,
-                began,
-                was,
-                bent,
-                most,
-            )
-    end_limb(target, limb, row, frame, place, upper, hinge, end, local, residual)
-    if turned.shape[0] > 0:
-        above = qt.mul(qt.mul(frame, upper), hinge)
-        turn_end(end_row(count, limb + 1), above, turned, limb + 2, s.limits, model.balls, local)
-
-
 @specialised
 def solve_frame(model, s, points, turned, flesh, local, memory, residual, scratch):
     """Solve one frame; returns the status."""
@@ -210,7 +130,10 @@ def solve_frame(model, s, points, turned, flesh, local, memory, residual, scratc
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, chord = start_trunk(model, s, filled, turned, local, memory, world, segs)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
-    for limb in range(4):
+    for k in range(4):
+        limb = (k + 2) % 4  # legs, then arms, which may have to stay out of the thighs
+        if limb == 0:
+            part_legs(model, s, turned, began, flesh, root, scratch, local, residual)
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
             continue
@@ -247,7 +170,10 @@ def solve_frame_from(model, s, points, turned, given, flesh, local, memory, resi
     take_start(model, s, given, turned, local)
     x = qt.x_axis(qt.load(local, 0))
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
-    for limb in range(4):
+    for k in range(4):
+        limb = (k + 2) % 4  # legs, then arms, which may have to stay out of the thighs
+        if limb == 0:
+            part_legs(model, s, turned, began, flesh, root, scratch, local, residual)
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
             continue

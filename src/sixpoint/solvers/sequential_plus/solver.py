@@ -128,8 +128,9 @@ class SequentialIKPlus(SixPointSolver):
             of freedom). They are met exactly where limits allow; wrists and ankles have none. In a frame
             without one the effector counts by its position alone.
         avoid: "elbows" keeps elbows out of the trunk, by the figure's shape or, without one, by elliptic
-            cylinders; "forearms" also forearms and hands, out of trunk and head. Wrists stay on their targets
-            and swivel angles do not jump; nothing is avoided by default.
+            cylinders; "forearms" also forearms and hands, out of trunk and head; "thighs" thighs out of each
+            other; "arms" elbows, forearms and hands out of the thighs, and elbows out of the trunk. Wrists
+            and ankles stay on their targets and swivel angles do not jump; nothing is avoided by default.
 
     Raises:
         SixpointError: A constant has an impossible value, or there is no such effector.
@@ -270,14 +271,13 @@ class SequentialIKPlus(SixPointSolver):
         chain = SpineChain.from_figure(self.figure, own_pelvis=True)
         return build_model(self.figure, chain, ends=bool(self.rotations))
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+    def _lower(self, model: Model) -> tuple[NDArray[Any] | None, ...]:
         return (*super()._lower(model), *self._find_flesh())
 
-    def _find_flesh(self) -> tuple[Array, ...]:
-        """What the arms stay out of, the last of the fixed arrays; none where nothing is avoided."""
+    def _find_flesh(self) -> tuple[Array | None, ...]:
+        """What is kept apart, the last two of the fixed arrays; none where nothing is avoided."""
         chain = SpineChain.from_figure(self.figure, own_pelvis=True)
-        flesh = find_flesh(self.figure, chain, self.avoid)
-        return () if flesh is None else (flesh,)
+        return find_flesh(self.figure, chain, self.avoid) or ()
 
     def _make_work(self) -> tuple[Array, ...]:
         return (np.empty((work_rows(self._trunk), 4)),)

@@ -29,6 +29,7 @@ def solve_prior_clear(
     places,
     turns,
     flesh,
+    thighs,
     work,
     course,
     thoughts,
@@ -41,7 +42,7 @@ def solve_prior_clear(
     outcome,
     residual,
 ):
-    """Solve F frames; ``flesh`` as in ``avoidance.packing``, the others as of ``solve_prior``."""
+    """Solve F frames; ``flesh`` and ``thighs`` as in ``avoidance.packing``, others as of ``solve_prior``."""
     model = unpack_model(table, integers, balls, chords)
     s = unpack_settings(options)
     facts = unpack_facts(numbers)
@@ -51,7 +52,7 @@ def solve_prior_clear(
     thought = unpack_thought(thoughts, course)
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh)
+    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(
             model,

@@ -14,12 +14,8 @@ from sixpoint.kernels.jit import entry, helper, specialised
 from sixpoint.kernels.swing_twist import clamp
 from sixpoint.solvers.sequential.frame import place_limb
 from sixpoint.solvers.sequential.packing import unpack_work
-from sixpoint.solvers.sequential_plus.frame import (
-    end_trunk,
-    point_limb,
-    pose_limb,
-    start_trunk,
-)
+from sixpoint.solvers.sequential_plus.frame import end_trunk, start_trunk
+from sixpoint.solvers.sequential_plus.limb_step import part_legs, point_limb, pose_limb
 from sixpoint.solvers.sequential_plus.measured import is_measured
 from sixpoint.solvers.sequential_plus.packing import unpack_settings
 from sixpoint.solvers.sequential_prior.features import (
@@ -189,7 +185,10 @@ def solve_frame(
     x, trust = ask_prior(model, s, facts, places, turns, turned, filled, memory, thought, local)
     remember_ends(qt.load(local, 0), filled, memory)
     root = end_trunk(model, s, filled, turned, x, chord, local, memory, world, segs, residual)
-    for limb in range(4):
+    for k in range(4):
+        limb = (k + 2) % 4  # legs, then arms, which may have to stay out of the thighs
+        if limb == 0:
+            part_legs(model, s, turned, began, flesh, root, scratch, local, residual)
         residual[limb + 2] = 0.0
         if filled[limb + 2, 3] == 0.0:
             continue

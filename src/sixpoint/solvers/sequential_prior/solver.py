@@ -83,7 +83,7 @@ class SequentialIKPrior(SequentialIKPlus):
         self._networks = read_prior(None if prior is None else Path(prior))
         super().__init__(figure, limits=limits, habits=habits, rotations=rotations, avoid=avoid)
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+    def _lower(self, model: Model) -> tuple[NDArray[Any] | None, ...]:
         plain = SixPointSolver._lower(self, model)
         return (*plain, pack_facts(self._find_facts(model)), *self._networks, *self._find_flesh())
 

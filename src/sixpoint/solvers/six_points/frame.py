@@ -4,7 +4,7 @@ State between frames is one array (rows + 15, 4): ``local`` (rows, 4) are the an
 the posed joints (as many as ``Model.balls`` has rows) and ``memory`` (15, 4) holds the estimated X axis, the
 bending plane's normal (zero if none), the positions of pelvis and head, whether there was a frame before and
 whether the X axis was ever told by wrists or ankles, the estimated Y axis, and rows for what a method
-remembers beside.
+remembers beside. Avoidance has numbers beside the third and fourth.
 """
 
 from sixpoint.kernels import quaternion as qt

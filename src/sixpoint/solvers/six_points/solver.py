@@ -78,7 +78,7 @@ class SixPointSolver(ABC):
         """The figure lowered."""
         return build_model(self.figure)
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+    def _lower(self, model: Model) -> tuple[NDArray[Any] | None, ...]:
         """The figure as the entry's first arrays."""
         table, integers = pack_model(model)
         return (table, integers, model.balls, model.chords)
@@ -249,7 +249,7 @@ def weights_at_rate(weights: tuple[float, float, float], dt: float) -> tuple[flo
 class TreeSolver(SixPointSolver):
     """A method that sees the posed joints as a plain tree, see ``six_points.tree``."""
 
-    def _lower(self, model: Model) -> tuple[NDArray[Any], ...]:
+    def _lower(self, model: Model) -> tuple[NDArray[Any] | None, ...]:
         return (*super()._lower(model), *pack_tree(self._build_tree(model)))
 
     def _build_tree(self, model: Model) -> Tree:
