@@ -23,7 +23,7 @@ from reaches import reach_across, wander_around
 from seats import KINDS, POSTURES, move_legs, rest_hands
 
 import sixpoint as sp
-from sixpoint.body.flesh import build_shape
+from sixpoint.body.surface.flesh import build_shape
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from reaches import reach_across
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.flesh import build_shape
-from sixpoint.body.prisms import build_prisms, directions
+from sixpoint.body.surface.flesh import build_shape
+from sixpoint.body.surface.prisms import build_prisms, directions
 from sixpoint.render.camera import Camera
 from sixpoint.render.colours import paint
 from sixpoint.render.encoding import encode_png, lay_out

@@ -12,7 +12,7 @@ import numpy as np
 
 import sixpoint as sp
 from sixpoint.body.anthropometry import segments_of_stature
-from sixpoint.body.flesh import build_shape
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.jobs.driving import drive
 from sixpoint.render.colours import paint
 from sixpoint.render.encoding import encode_png, lay_out

@@ -27,8 +27,8 @@ from virtual_markers import drop, misplace, place_virtual, record
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.calibration.markers import calibrate_markers
 from sixpoint.formats.markers import load_markers

@@ -6,8 +6,8 @@ import numpy as np
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
 
 Array = np.ndarray
 

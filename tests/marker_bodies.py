@@ -6,7 +6,7 @@ import numpy as np
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.markers import Event, Markers
+from sixpoint.body.markers.recording import Event, Markers
 from sixpoint.body.motion import FileSpace
 from sixpoint.samples import make_sample
 

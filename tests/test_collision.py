@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.flesh import build_shape
-from sixpoint.body.prisms import DIRECTIONS, Prisms, _prism, build_prisms, directions
+from sixpoint.body.surface.flesh import build_shape
+from sixpoint.body.surface.prisms import DIRECTIONS, Prisms, _prism, build_prisms, directions
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.avoidance.clearance import deepest, gap_to_prism
 from sixpoint.solvers.avoidance.options import check_avoid

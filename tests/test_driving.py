@@ -10,7 +10,7 @@ from body_rigs import family_skeleton
 from conftest import recordings, unmeasured
 from gltf_avatars import EXTENSIONS, PLACES, make_avatar
 from sixpoint.body import rotations as rot
-from sixpoint.body.flesh import build_shape
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.cli import main
 from sixpoint.errors import FormatError
 from sixpoint.formats import load, load_avatar, save

@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 import sixpoint as sp
 from body_rigs import FAMILIES, family_skeleton, load, random_quaternions, reframed
 from conftest import recordings, unmeasured
-from sixpoint.body.flesh import build_shape
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.flesh import build_shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError
 
 trimesh = pytest.importorskip("trimesh")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from conftest import recordings, unmeasured
 from marker_bodies import walking_markers
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import FileSpace
 from sixpoint.errors import FormatError
 from sixpoint.formats import load

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from conftest import recordings, unmeasured
 from marker_bodies import walking_markers
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.errors import FormatError
 from sixpoint.formats.markers import holds_markers, load_markers, save_markers
 from sixpoint.formats.markers.landmarks import LANDMARKS

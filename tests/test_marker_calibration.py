@@ -12,8 +12,8 @@ import pytest
 from conftest import unmeasured
 from sixpoint.body.anthropometry import segments_of_skeleton
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
 from sixpoint.calibration.markers import calibrate_markers
 from sixpoint.calibration.markers.posing import pose_markers
 from sixpoint.errors import TargetError

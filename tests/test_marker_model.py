@@ -7,7 +7,7 @@ import pytest
 
 from sixpoint.body.anthropometry import build_skeleton, segments_of_skeleton, segments_of_stature
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.calibration.markers.text import format_marker_model, parse_marker_model
 from sixpoint.errors import FigureError, FormatError
 from sixpoint.jobs.marker_models import load_marker_model, save_marker_model

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from conftest import recordings, unmeasured
 from marker_bodies import misplaced_roles, walking_markers
-from sixpoint.body.marker_roles import _sets, find_marker_roles, segments_of_roles
+from sixpoint.body.markers.roles import _sets, find_marker_roles, segments_of_roles
 from sixpoint.errors import FormatError, TargetError
 from sixpoint.formats.markers import load_markers
 

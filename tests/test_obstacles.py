@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from prioritized_bodies import figure as make_body
-from sixpoint.body.distance_grid import build_grid, check_closed
-from sixpoint.body.flesh import build_shape
+from sixpoint.body.surface.distance_grid import build_grid, check_closed
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.errors import SixpointError
 from sixpoint.kernels.distance import grid_distance
 from sixpoint.solvers.prioritized.blocks import pack_grid

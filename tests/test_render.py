@@ -11,7 +11,7 @@ import pytest
 import sixpoint as sp
 from body_rigs import family_skeleton
 from sixpoint.body import rotations as rot
-from sixpoint.body.flesh import build_shape
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.cli import main
 from sixpoint.errors import SixpointError
 from sixpoint.jobs import render as job

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
-from sixpoint.body.markers import Event, Markers
-from sixpoint.body.shape import Shape
+from sixpoint.body.markers.recording import Event, Markers
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError, TargetError
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import sixpoint as sp
 from sixpoint.body.limits import Limits
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.cli.app import main
 from sixpoint.errors import Remark, SixpointError
 from sixpoint.formats import load_shape

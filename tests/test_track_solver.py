@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.errors import FigureError, SixpointError, TargetError
 from sixpoint.kernels.linear import solve_normal

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.samples import make_sample
 
 # Name -> joint, and place in its anatomical frame [m]; of the sided ones that of the left side.

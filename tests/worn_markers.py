@@ -9,9 +9,9 @@ import numpy as np
 from sixpoint.body import rotations as rot
 from sixpoint.body.anthropometry import segments_of_stature
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.marker_roles import find_marker_roles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import find_marker_roles
 from sixpoint.body.motion import Motion
 from sixpoint.calibration.markers.kinematics import SEGMENTS, Kinematics
 from sixpoint.calibration.markers.places import place_markers

@@ -10,18 +10,18 @@
 Metres, radians, seconds; Y up, Z forward, X to the figure's left; quaternions are xyzw.
 """
 
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.dofs import Ball, Dofs, Fixed, Hinges, SwingTwist
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh import build_shape
 from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
 from sixpoint.body.limits import Limits
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.marker_roles import MarkerRoles, find_marker_roles
-from sixpoint.body.markers import Event, Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Event, Markers
+from sixpoint.body.markers.roles import MarkerRoles, find_marker_roles
 from sixpoint.body.motion import Motion, Pose
-from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.flesh import build_shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.calibrate import calibrate
 from sixpoint.calibration.markers import calibrate_markers

@@ -28,9 +28,9 @@ from sixpoint.body.mapping import read_mapping
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.body.neutral import compute_neutral
 from sixpoint.body.roles import Roles, find_roles
-from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton, frozen
 from sixpoint.body.spine_chain import COINCIDENT, SpineChain
+from sixpoint.body.surface.shape import Shape
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FigureError
 

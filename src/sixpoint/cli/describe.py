@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.joint_angles import JointAngles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import FileSpace, Motion
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import listed
@@ -106,7 +106,9 @@ def describe_solved(solved: Solved, targets: Targets) -> list[Row]:
     if lost.any():
         rows.append(("lost points", _shares(lost)))
     if solved.inside:
-        rows.append(("inside", "; ".join(describe_penetration(solved.inside))))
+        rows.append(
+            ("inside", "; ".join(describe_penetration(solved.inside)) + " (by outlines wider than flesh)")
+        )
     return [*rows, ("speed", f"{microseconds(solved)} us per frame")]
 
 

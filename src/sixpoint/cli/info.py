@@ -13,7 +13,7 @@ from sixpoint.cli.screen import Screen
 
 if TYPE_CHECKING:
     from sixpoint.body.figure import Figure
-    from sixpoint.body.markers import Markers
+    from sixpoint.body.markers.recording import Markers
     from sixpoint.body.skeleton import Skeleton as Rig
     from sixpoint.jobs.info import MarkersInfo, MotionInfo, TargetsInfo
 

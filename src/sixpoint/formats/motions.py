@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.motion import Motion
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats.acclaim_write import format_amc, format_asf, plan_bones
 from sixpoint.formats.amc import read_acclaim

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sixpoint.body.joint_angles import JointAngles, compute_joint_angles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError

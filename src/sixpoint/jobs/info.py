@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_roles import MarkerRoles, find_marker_roles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import MarkerRoles, find_marker_roles
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FigureError, FormatError
 from sixpoint.formats import Avatar, holds_markers, load_avatar

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.calibration.markers.text import format_marker_model, parse_marker_model
 from sixpoint.errors import FormatError
 from sixpoint.formats.atomic import write_files

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import Motion
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed

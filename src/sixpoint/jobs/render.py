@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh import build_shape
 from sixpoint.body.motion import Motion
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.errors import FormatError, SixpointError
 from sixpoint.formats import load_avatar
 from sixpoint.formats.atomic import write_files

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh import build_shape
 from sixpoint.body.limits import Limits
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, listed
 from sixpoint.jobs.progress import Progress, silent

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh import build_shape
 from sixpoint.body.motion import Motion
+from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.flesh import build_shape
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats import SHAPE_OUTPUTS, save
 from sixpoint.formats.atomic import check_writable

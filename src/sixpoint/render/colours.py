@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import SixpointError, listed
 from sixpoint.render.light import of_hex
 

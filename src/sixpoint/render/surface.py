@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.shape import Shape
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import PARTS, MarkerModel
-from sixpoint.body.marker_roles import Layout
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import PARTS, MarkerModel
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import Layout
 from sixpoint.calibration.markers.checks import check_pelvis, check_sides
 from sixpoint.calibration.markers.expectations import expect_lengths, moving_std, standing_std
 from sixpoint.calibration.markers.frames import choose_frames

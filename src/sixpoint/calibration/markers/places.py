@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.marker_roles import MarkerRoles
+from sixpoint.body.markers.roles import MarkerRoles
 from sixpoint.body.tables import read_shipped
 from sixpoint.calibration.markers.kinematics import Kinematics
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.anthropometry import segments_of_skeleton
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.marker_roles import Layout, find_marker_roles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import Layout, find_marker_roles
 from sixpoint.body.motion import Motion
 from sixpoint.calibration.markers.kinematics import SEGMENTS, Kinematics
 from sixpoint.calibration.markers.places import place_markers

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.marker_roles import Layout, MarkerRoles, find_marker_roles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import Layout, MarkerRoles, find_marker_roles
 from sixpoint.errors import TargetError, listed
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.anthropometry import MEAN_STATURE, segments_of_stature
-from sixpoint.body.marker_roles import MarkerRoles
+from sixpoint.body.markers.roles import MarkerRoles
 from sixpoint.calibration.markers.kinematics import SEGMENTS, Kinematics
 from sixpoint.calibration.markers.places import place_markers
 from sixpoint.errors import TargetError

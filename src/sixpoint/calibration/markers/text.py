@@ -10,7 +10,7 @@ import numpy as np
 
 from sixpoint.body.anthropometry import segments_of_skeleton, segments_of_stature
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import PARTS, MarkerModel
+from sixpoint.body.markers.model import PARTS, MarkerModel
 from sixpoint.calibration.toml import TableReader, toml_key, toml_number, toml_numbers, toml_text
 from sixpoint.errors import FormatError
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.appearance import Appearance
+from sixpoint.body.surface.appearance import Appearance
 from sixpoint.formats.gltf.accessors import read_floats
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.mesh import Piece

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.mapping import read_mapping
 from sixpoint.body.motion import FileSpace, Motion
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError, FormatError, SixpointError
 from sixpoint.formats.gltf.animation import DEFAULT_RATE, Channel, find_grid, read_channels, warn_of_scales
 from sixpoint.formats.gltf.appearance import bake_appearance

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.formats.gltf.accessors import read_floats, read_indices
 from sixpoint.formats.gltf.binding import Skin
 from sixpoint.formats.gltf.document import COMPRESSIONS, Document

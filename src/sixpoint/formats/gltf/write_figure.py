@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.appearance import Appearance
 from sixpoint.body.motion import Motion
-from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError
 from sixpoint.formats.gltf.builder import INDICES, VERTICES, Builder
 from sixpoint.formats.gltf.keys import Keys

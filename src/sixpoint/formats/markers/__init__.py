@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.targets import EFFECTORS
 from sixpoint.errors import FormatError, Remark, SixpointError, listed
 from sixpoint.formats.atomic import check_writable, write_files

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sixpoint.body.markers import Event, Markers
+from sixpoint.body.markers.recording import Event, Markers
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats.markers.raw import RawMarkers
 from sixpoint.formats.source import read_bytes

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.markers import Event
+from sixpoint.body.markers.recording import Event
 from sixpoint.errors import FormatError
 from sixpoint.formats.markers.c3d_sections import (
     BLOCK,

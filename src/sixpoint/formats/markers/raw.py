@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.markers import Event
+from sixpoint.body.markers.recording import Event
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats.source import LARGEST
 

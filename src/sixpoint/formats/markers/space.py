@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.marker_roles import MarkerRoles, find_marker_roles
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
+from sixpoint.body.markers.roles import MarkerRoles, find_marker_roles
 from sixpoint.body.motion import FileSpace
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats.markers.raw import RawMarkers

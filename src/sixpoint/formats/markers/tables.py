@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.recording import Markers
 from sixpoint.errors import FormatError, listed
 from sixpoint.formats.markers.raw import RawMarkers
 from sixpoint.formats.markers.times import rate_of_times

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FormatError
 from sixpoint.formats.source import LARGEST
 from sixpoint.formats.usd.matrices import ALIKE

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.motion import FileSpace, Motion
-from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FormatError
 from sixpoint.formats.source import LARGEST, read_bytes
 from sixpoint.formats.usd.library import import_usd

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.motion import Motion
-from sixpoint.body.shape import Shape
 from sixpoint.body.skeleton import Skeleton
+from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FormatError
 from sixpoint.formats.usd import SITES
 from sixpoint.formats.usd.library import import_usd

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.errors import SixpointError
 from sixpoint.jobs.reading import ALL, Reading, parse_frames
 from sixpoint.jobs.solving import Solving

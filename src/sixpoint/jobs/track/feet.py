@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.motion import Motion
 from sixpoint.signals.contacts import find_contacts
 from sixpoint.solvers.tracking.priorities import find_parts

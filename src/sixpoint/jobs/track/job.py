@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.joint_angles import compute_joint_angles
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import FileSpace
 from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.limits import Limits
-from sixpoint.body.marker_model import MarkerModel
-from sixpoint.body.markers import Markers
+from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.recording import Markers
 from sixpoint.calibration.markers import calibrate_markers
 from sixpoint.errors import TargetError, listed
 from sixpoint.formats import load_markers

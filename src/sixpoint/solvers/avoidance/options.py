@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.flesh_regions import thigh_radii
-from sixpoint.body.prisms import build_prisms
+from sixpoint.body.surface.flesh_regions import thigh_radii
+from sixpoint.body.surface.prisms import build_prisms
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.avoidance.packing import WIDTH, pack_flesh, pack_thighs
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sixpoint.body import prisms as outlines
+from sixpoint.body.surface import prisms as outlines
 from sixpoint.kernels.jit import helper
 
 DIRECTIONS, SLICES = 32, 7  # written out: the cache of compiled code knows this file, not ``body``

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.flesh_regions import thigh_radii
 from sixpoint.body.motion import Motion
-from sixpoint.body.prisms import build_prisms
+from sixpoint.body.surface.flesh_regions import thigh_radii
+from sixpoint.body.surface.prisms import build_prisms
 from sixpoint.errors import SkeletonError
 from sixpoint.solvers.avoidance.depths import find_depths
 from sixpoint.solvers.avoidance.options import AVOIDABLE, arm_lengths, check_avoid

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.distance_grid import DistanceGrid
 from sixpoint.body.dofs import Ball, Hinges
+from sixpoint.body.surface.distance_grid import DistanceGrid
 from sixpoint.errors import SixpointError
 from sixpoint.kernels import distance
 from sixpoint.solvers.prioritized.articulation import Articulation

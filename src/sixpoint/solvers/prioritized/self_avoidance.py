@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh_regions import HEAD, NECK, SHANK, THIGH, TRUNK, neutral_surface, parts_of_joints
+from sixpoint.body.surface.flesh_regions import (
+    HEAD,
+    NECK,
+    SHANK,
+    THIGH,
+    TRUNK,
+    neutral_surface,
+    parts_of_joints,
+)
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.prioritized.tasks import Capsule, ObstacleTask
 

@@ -18,8 +18,8 @@ from typing import ClassVar, Literal
 
 from numpy.typing import ArrayLike
 
-from sixpoint.body.distance_grid import DistanceGrid, build_grid
 from sixpoint.body.motion import Pose
+from sixpoint.body.surface.distance_grid import DistanceGrid, build_grid
 
 Vector = tuple[float, float, float]
 FLOOR = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Dofs
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.widening import widen
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.solver import MarkerTracker

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.errors import FigureError
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.blocks import Block, lower_task

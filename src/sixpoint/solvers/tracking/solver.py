@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.figure import Figure
-from sixpoint.body.marker_model import MarkerModel
+from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.motion import Motion, Pose
 from sixpoint.errors import SixpointError, TargetError
 from sixpoint.solvers.prioritized.articulation import Articulation

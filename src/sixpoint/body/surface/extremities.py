@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
-from sixpoint.body.flesh_parts import Flesh
-from sixpoint.body.loft import Loft, loft, sample
+from sixpoint.body.surface.flesh_parts import Flesh
+from sixpoint.body.surface.loft import Loft, loft, sample
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.flesh_regions import arm_radius, bare_trunk, trunk_points
+from sixpoint.body.surface.flesh_regions import arm_radius, bare_trunk, trunk_points
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
-from sixpoint.body.loft import Loft
-from sixpoint.body.shape import Shape
+from sixpoint.body.surface.loft import Loft
+from sixpoint.body.surface.shape import Shape
 
 Array = NDArray[np.float64]
 

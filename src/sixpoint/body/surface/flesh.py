@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.extremities import add_foot, add_hand, add_head
 from sixpoint.body.figure import Figure
-from sixpoint.body.flesh_parts import Flesh, frames_along, smooth_step, weigh_along
-from sixpoint.body.loft import loft, sample
-from sixpoint.body.shape import Shape
 from sixpoint.body.stature import stature_of
+from sixpoint.body.surface.extremities import add_foot, add_hand, add_head
+from sixpoint.body.surface.flesh_parts import Flesh, frames_along, smooth_step, weigh_along
+from sixpoint.body.surface.loft import loft, sample
+from sixpoint.body.surface.shape import Shape
 from sixpoint.body.tables import read_shipped
 
 Array = NDArray[np.float64]
