@@ -323,9 +323,9 @@ def test_controls_become_options(method, clips):
             values[setting.name] = type(setting.value)(0.5 * (setting.domain[0] + setting.domain[1]))
     options = read_settings(method, values)
     assert options.pop("limits") is False
-    assert len(options) == len(
-        {"weights" if n[0] == "w" and n[1:].isdigit() else n for n in values} - {"limits"}
-    ) - (5 if "rotations" in options else 0) - (1 if "avoid" in options else 0)
+    several = {"w": "weights", "turn": "rotations", "avoid": "avoid"}  # options that have several controls
+    names = {several.get("w" if re.fullmatch(r"w\d", n) else n.split(" ")[0], n) for n in values}
+    assert len(options) == len(names - {"limits"})
     Posing(method, values).make(clips[0].figure)
 
 

@@ -31,7 +31,7 @@ def solve_sequential_clear(
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
+    trunk = unpack_flesh(flesh, thighs, work[work.shape[0] - 4 :], memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(model, settings, points[f], trunk, local, memory, residual[f], scratch)
         outcome[f, 1] = 1

@@ -113,7 +113,7 @@ def place_arm(chest, girdle, clavicles, limbs, balls, limits, hold, side, root, 
 @helper
 def pose_trunk(model, settings, points, local, memory, residual, scratch):
     """Pelvis and spine of a frame; returns whether a point is lost, and where the pelvis is."""
-    world, segs, start, flat, filled, _ = scratch
+    world, segs, start, flat, filled = scratch
     lost = fill_lost(points, filled, memory, model.chords[0])
     x, y = estimate_pelvis(filled, memory, settings.w1, settings.w2, settings.w3)
     root = solve_trunk(
@@ -173,8 +173,9 @@ def solve_frame(model, settings, points, flesh, local, memory, residual, scratch
     lost, root = pose_trunk(model, settings, points, local, memory, residual, scratch)
     world, segs, filled = scratch.world, scratch.segs, scratch.filled
     for k in range(4):
-        limb = (k + 2) % 4  # legs, then arms, which may have to stay out of the thighs
+        limb = k  # arms, then legs; neither depends on the other, unless arms have to stay out of the thighs
         if flesh is not None:
+            limb = (k + 2) % 4
             if limb == 0:
                 part_thighs(
                     flesh.thighs,

@@ -28,7 +28,6 @@ class Scratch(NamedTuple):
         start: (S, 4) local rotations to bend from.
         flat: (S, 4) two components of the segments in the bending plane [m].
         filled: (6, 4) effector positions with the lost ones filled in [m], and 1 for a known point, else 0.
-        thighs: (4, 4) where hips and knees are, see ``avoidance.packing``.
     """
 
     world: np.ndarray
@@ -36,7 +35,6 @@ class Scratch(NamedTuple):
     start: np.ndarray
     flat: np.ndarray
     filled: np.ndarray
-    thighs: np.ndarray
 
 
 @helper
@@ -54,19 +52,13 @@ def unpack_settings(options):
 
 
 def work_rows(segments):
-    """Rows of working memory for a trunk of so many segments."""
+    """Rows of working memory for a trunk of so many segments; the last four are for thighs."""
     return 4 * segments + 10
 
 
 @helper
 def unpack_work(work, s):
     """Working memory as slices."""
-    filled = 4 * s
     return Scratch(
-        work[:s],
-        work[s : 2 * s],
-        work[2 * s : 3 * s],
-        work[3 * s : filled],
-        work[filled : filled + 6],
-        work[filled + 6 :],
+        work[:s], work[s : 2 * s], work[2 * s : 3 * s], work[3 * s : 4 * s], work[4 * s : 4 * s + 6]
     )

@@ -33,7 +33,7 @@ def solve_plus_clear(
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
+    trunk = unpack_flesh(flesh, thighs, work[work.shape[0] - 4 :], memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(
             model, s, points[f], turned[f], trunk, local, memory, residual[f], scratch
@@ -67,7 +67,7 @@ def solve_from_start_clear(
     scratch = unpack_work(work, model.segments.shape[0])
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
+    trunk = unpack_flesh(flesh, thighs, work[work.shape[0] - 4 :], memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame_from(
             model, s, points[f], turned[f], given[f], trunk, local, memory, residual[f], scratch

@@ -52,7 +52,7 @@ def solve_prior_clear(
     thought = unpack_thought(thoughts, course)
     rows = state.shape[0] - MEMORY_ROWS
     local, memory = state[:rows], state[rows:]
-    trunk = unpack_flesh(flesh, thighs, scratch.thighs, memory)
+    trunk = unpack_flesh(flesh, thighs, work[work.shape[0] - 4 :], memory)
     for f in range(points.shape[0]):
         outcome[f, 0] = solve_frame(
             model,
