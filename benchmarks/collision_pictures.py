@@ -48,7 +48,8 @@ def outline(prism, radii, height):
 def draw_depth(figure, motion, cleared, frame, side, path):
     """The trunk's outline at the height of an elbow that is in it, and where the elbow goes."""
     solver = sp.SequentialIK(figure, avoid="elbows")
-    flesh, prisms, chain = unpack_flesh(solver._arrays[-1]), build_prisms(figure), figure.spine_chain
+    flesh = unpack_flesh(solver._arrays[-2], None, None, None)  # the trunk; the last array is of the thighs
+    prisms, chain = build_prisms(figure), figure.spine_chain
     roles = figure.roles
     positions, world = (array[frame] for array in motion.transforms)
     turned = rot.mul(world, rot.inv(figure.neutral))
