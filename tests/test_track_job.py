@@ -16,7 +16,7 @@ from sixpoint.cli.app import main
 from sixpoint.errors import Remark, SixpointError
 from sixpoint.formats import load_shape
 from sixpoint.formats.markers import save_markers
-from sixpoint.jobs.marker_models import save_marker_model
+from sixpoint.jobs.marker_models import load_marker_model, save_marker_model
 from sixpoint.jobs.solving import Solving
 from sixpoint.jobs.track.feet import find_stances
 from sixpoint.jobs.track.job import track
@@ -73,6 +73,25 @@ def test_the_command_says_what_became_of_the_markers(files, tmp_path, capsys):
     assert name in report and (tmp_path / "report" / "pictures" / "residuals.png").stat().st_size > 10_000
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert main(words) == 2 and "exists" in capsys.readouterr().err
+
+
+def test_the_person_is_saved_for_another_time(files, tmp_path):
+    """A saved model is the one that was followed, and is not written over."""
+    saved = tmp_path / "anna.toml"
+    done = track(files[0], tmp_path / "a.bvh", following=following(files), save_model=saved)
+    np.testing.assert_allclose(load_marker_model(saved).offsets, done.model.offsets, atol=1e-6)
+    assert saved in done.files
+    with pytest.raises(SixpointError, match="exists"):
+        track(files[0], tmp_path / "b.bvh", following=following(files), save_model=saved)
+
+
+def test_a_report_folder_in_use_is_refused_before_the_work(files, tmp_path):
+    """Nothing is written where the report cannot be."""
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report" / "mine.txt").write_text("mine")
+    with pytest.raises(SixpointError, match="not empty"):
+        track(files[0], tmp_path / "a.bvh", following=following(files), report=tmp_path / "report")
+    assert not (tmp_path / "a.bvh").exists()
 
 
 def test_joint_angles_are_written(files, tmp_path):

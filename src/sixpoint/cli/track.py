@@ -33,6 +33,9 @@ def track(
     model: Annotated[
         Path | None, Parameter(help="A saved marker model; by default one is calibrated on the recording.")
     ] = None,
+    save_model: Annotated[
+        Path | None, Parameter(help="Also save the calibrated person, for --model, to this .toml.")
+    ] = None,
     static: Annotated[
         Path | None, Parameter(help="The same person and markers standing still, to calibrate on.")
     ] = None,
@@ -88,6 +91,8 @@ def track(
     ```
     sixpoint track walk.c3d -o walk.bvh --report walk_report
     sixpoint track walk.trc --static static.trc -o walk.mot --cutoff 6
+    sixpoint track range.c3d --save-model anna.toml
+    sixpoint track dance.c3d --model anna.toml
     sixpoint track dance.c3d --six --method sik-prior
     sixpoint track walk.c3d --avatar hero.vrm -o hero.glb
     sixpoint track walk.c3d --view
@@ -115,6 +120,7 @@ def track(
             avatar=avatar,
             picture=picture,
             report=report,
+            save_model=save_model,
             force=force,
             progress=progress,
         )

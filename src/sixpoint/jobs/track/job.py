@@ -18,6 +18,7 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import SixpointError
 from sixpoint.formats import ANGLE_SUFFIXES, OUTPUT_SUFFIXES, save, save_angles
 from sixpoint.jobs.driving import AVATAR_OUTPUTS, drive, open_avatar
+from sixpoint.jobs.marker_models import save_marker_model
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.reading import Reading, open_markers
 from sixpoint.jobs.solving import Solved, Solving, solve
@@ -25,7 +26,7 @@ from sixpoint.jobs.track.feet import TIGHT, hold_feet
 from sixpoint.jobs.track.models import columns_of, find_model, find_ranges
 from sixpoint.jobs.track.options import Following
 from sixpoint.jobs.track.six import reduce_to_six
-from sixpoint.jobs.writing import check_output, keep_sources, save_dressed
+from sixpoint.jobs.writing import check_output, keep_sources, prepare_folder, save_dressed
 from sixpoint.signals.low_pass import low_pass
 from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedMotion
 
@@ -75,6 +76,7 @@ def track(
     avatar: Path | None = None,
     picture: Path | None = None,
     report: Path | None = None,
+    save_model: Path | None = None,
     force: bool = False,
     progress: Progress = silent,
 ) -> Tracking:
@@ -90,6 +92,7 @@ def track(
         avatar: A .glb, .gltf or .vrm that is posed as the person is, and written instead.
         picture: A .png that shows the body and the markers at some frames.
         report: A folder for a report with residuals of every marker, as HTML and Markdown.
+        save_model: A .toml for the calibrated person, to be used again as ``Following.model``.
         force: Overwrite existing files.
         progress: Told how far the work is.
 
@@ -107,12 +110,17 @@ def track(
         out = out or Path(f"{source.stem}_{'six' if six else 'tracked'}.bvh")
         files = check_output(out, OUTPUTS, force)
     files += check_output(picture, (".png",), force) if picture else []
+    files += check_output(save_model, (".toml",), force) if save_model else []
+    if report:
+        prepare_folder(report, force)
     keep_sources(files, [source, *following.files, avatar])
     hero = None if avatar is None else open_avatar(avatar)
     markers = open_markers(source, reading)
     started = time.perf_counter()
     model = find_model(markers, following, progress)
     calibration = 0.0 if following.model else time.perf_counter() - started
+    if save_model:
+        save_marker_model(model, save_model, force=force)
     positions = columns_of(model, markers)
     if following.cutoff is not None:
         positions = low_pass(positions, markers.rate, following.cutoff).positions
