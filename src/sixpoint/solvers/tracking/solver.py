@@ -22,22 +22,19 @@ from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.full_body import attractor_state
 from sixpoint.solvers.prioritized.tasks import PostureTask
 from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.following import Follower, settle
 from sixpoint.solvers.tracking.model import lower_markers
 from sixpoint.solvers.tracking.priorities import PRIORITIES
-from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine, join, reverse
-from sixpoint.solvers.tracking.start import find_swaps, place_base, refuse_strays
+from sixpoint.solvers.tracking.running import State, TrackingEngine
+from sixpoint.solvers.tracking.start import Beginning
 from sixpoint.solvers.tracking.two_sided import blend
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int64]
 
-CHUNK = 64  # frames between two reports of progress
-COLD, STRAYS = 60, 4  # iterations of a first frame, and times that its strays are left out
-CAUTIOUS = 0.1  # damping of a first frame, whose steps are large [m]
-POOR = 0.03  # a first frame that is off by more on average is also begun without limits [m]
 FAR = 1e7  # a marker farther away is not seen [m]
 IDLE = 1.0  # time in which what no marker tells goes most of its way to the relaxed posture [s]
-LOST, REJECTED, SWAPPED = tp.LOST, tp.REJECTED, tp.SWAPPED
+USED, LOST, REJECTED, SWAPPED = tp.USED, tp.LOST, tp.REJECTED, tp.SWAPPED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +47,7 @@ class TrackedFrame:
         flags: (M,) what became of each marker: 0 used, 1 not seen, 2 refused, 3 used under another's name.
         iterations: Iterations.
         state: What the next frame needs; give the whole as ``previous``.
+        adrift: For how long the markers have been too few or too far off [s]; soon they are begun with anew.
     """
 
     pose: Pose
@@ -57,6 +55,7 @@ class TrackedFrame:
     flags: Flags
     iterations: int
     state: State
+    adrift: float = 0.0
 
     def __repr__(self) -> str:
         return f"TrackedFrame({np.sum(self.flags == tp.USED)} of {len(self.flags)} markers used)"
@@ -123,9 +122,11 @@ class MarkerTracker:
             for levels, limbs in ((priorities, flext), (dict.fromkeys(PRIORITIES, 0), False))
         ]
         self.parts = low[0].parts
-        self._engine, self._starter = TrackingEngine(low[0]), TrackingEngine(low[1])
         self._options = tp.Options(limits, iterations, 0.01, False, gate, 0.0, damping, True)
         self._rest = attractor_state(self.body, PostureTask())
+        self._engine = TrackingEngine(low[0])
+        start = Beginning(self.body, model, self._engine, TrackingEngine(low[1]), self._rest)
+        self._follower = Follower(start, self._engine, self._rest)
 
     @property
     def figure(self) -> Figure:
@@ -153,15 +154,17 @@ class MarkerTracker:
         """
         frame = self._checked(np.asarray(markers, float)[None])
         if previous is None:
-            out, state = self._begin(frame[0])
+            adrift = 0.0
+            out, state = self._follower.begin(frame[0], self._options)
         else:
             if previous.state.markers.shape != (len(self.names), tp.MEMORY):
                 raise SixpointError("previous is of another model; begin with previous=None")
-            state = previous.state.copy()
-            out = self._engine.run(frame, self._rest, state, self._options_at(dt))
+            out, state, adrift = self._follower.go_on(
+                frame, previous.state.copy(), previous.adrift, self._options_at(dt)
+            )
         moving, translations = self.body.place_base(out.rotations, out.positions)
         pose = Pose(self.body.rig, out.rotations[0], translations[0], moving)
-        return TrackedFrame(pose, out.residual[0], out.flags[0], int(out.iterations[0]), state)
+        return TrackedFrame(pose, out.residual[0], out.flags[0], int(out.iterations[0]), state, adrift)
 
     def solve_frames(
         self,
@@ -185,17 +188,19 @@ class MarkerTracker:
         markers = self._checked(np.asarray(markers, float))
         if not (np.isfinite(rate) and rate > 0):
             raise TargetError(f"the frame rate must be positive, got {rate}")
-        report = progress or _silent
-        steady = two_sided is False  # what is followed both ways is made steady afterwards
-        out, state = self._follow(markers, 1 / rate, report, steady)
+        report, count = progress or _silent, len(markers)
+        options = self._options_at(1 / rate)
+        # What is followed both ways is made steady afterwards.
+        steady = options._replace(steady=two_sided is False)
+        out, state = self._follower.follow(markers, steady, report)
         if two_sided is None:
-            two_sided = len(markers) > 1 and bool(np.any(out.flags != tp.USED))
-        if two_sided:  # the way back begins where this one ended, and knows what it has learnt
-            state.speed[:, :3] *= -1.0
-            state.lag[:] = 0.0
-            back = self._run(markers[::-1], state, 1 / rate, lambda done: report(len(markers) + done), False)
+            two_sided = count > 1 and bool(np.any(out.flags != tp.USED))
+        if two_sided:
+            back = self._follower.follow_back(markers, state, steady, lambda done: report(count + done))
             bound = partial(self._engine.steady, rate=rate, limits=self._options.limits)
-            out = blend(self.body, self.model, out, reverse(back), markers, self._rest, rate, bound)
+            out = blend(self.body, self.model, out, back, markers, self._rest, rate, bound)
+        else:
+            out = settle(out, markers)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)
@@ -204,77 +209,6 @@ class MarkerTracker:
         """Compile the kernels, or load them from disk."""
         places = self.model.place(*self.figure.neutral_pose.compute_transforms())
         self.solve_frames(np.stack([places, places]), 100.0, two_sided=True)
-
-    def _follow(
-        self, markers: Array, dt: float, progress: Callable[[int], None], steady: bool
-    ) -> tuple[Followed, State]:
-        """Once through the frames; those before the first with enough markers take its pose."""
-        first = next((f for f, frame in enumerate(markers) if _enough(frame)), 0)
-        begun, state = self._begin(markers[first])
-        rest = self._run(markers[first + 1 :], state, dt, lambda done: progress(first + 1 + done), steady)
-        out = join([begun] * (first + 1) + [rest])
-        out.flags[:first] = np.where(np.isfinite(markers[:first, :, 0]), tp.REJECTED, tp.LOST)
-        out.residual[:first] = 0.0
-        return out, state
-
-    def _run(
-        self, markers: Array, state: State, dt: float, progress: Callable[[int], None], steady: bool
-    ) -> Followed:
-        """Frames that continue a state, in chunks."""
-        parts, options = [], self._options_at(dt)._replace(steady=steady)
-        for start in range(0, max(len(markers), 1), CHUNK):
-            chunk = markers[start : start + CHUNK]
-            parts.append(self._engine.run(chunk, self._rest, state, options))
-            progress(start + len(chunk))
-        return join(parts)
-
-    def _begin(self, markers: Array) -> tuple[Followed, State]:
-        """A first frame: all markers at one level, from the neutral pose; strays are left out.
-
-        Strays that are where another one should be have each other's labels.
-        """
-        seen, pairs = markers.copy(), []
-        for _ in range(STRAYS):
-            out, pose = self._begin_with(seen)
-            strays = refuse_strays(out.residual[0], out.flags[0], self._options.gate)
-            if not strays.any():
-                break
-            seen[strays] = np.nan
-        if np.isfinite(self._options.gate):
-            moving, translations = self.body.place_base(out.rotations, out.positions)
-            places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
-            pairs = find_swaps(markers, places[0], np.isnan(seen[:, 0]))
-        if pairs:
-            for pair in pairs:
-                seen[pair] = markers[pair[::-1]]
-            out, pose = self._begin_with(seen)
-        state = self._engine.fresh(pose)
-        quiet = self._options._replace(dt=1e-6, most=10)
-        out = self._engine.run(seen[None], self._rest, state, quiet)
-        state.speed[:] = 0.0
-        state.lag[:] = 0.0
-        out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
-        for pair in pairs:
-            out.flags[0][pair] = tp.SWAPPED
-        return out, state
-
-    def _begin_with(self, seen: Array) -> tuple[Followed, Array]:
-        """The better one of two ways to the first pose: within the limits all along, or at last."""
-        options = self._options._replace(cold=True, most=COLD, posture=0.02, damping=CAUTIOUS)
-        start = place_base(self.body, self.model, seen)
-        found = []
-        for limits in (True, False):
-            state = self._starter.fresh(start)
-            if not (limits or not self._options.limits):
-                self._starter.run(seen[None], self._rest, state, options._replace(limits=False))
-            out = self._starter.run(seen[None], self._rest, state, options)
-            used = out.flags[0] == tp.USED
-            off = float(np.mean(out.residual[0][used])) if used.any() else 0.0
-            found.append((off, out, state.pose))
-            if off < POOR:
-                break
-        _, out, pose = min(found, key=lambda entry: entry[0])
-        return out, pose
 
     def _checked(self, markers: Array) -> Array:
         if markers.ndim != 3 or markers.shape[1:] != (len(self.names), 3) or len(markers) == 0:
@@ -288,11 +222,6 @@ class MarkerTracker:
     def _options_at(self, dt: float) -> tp.Options:
         dt = min(max(dt, 1e-4), 0.5) if np.isfinite(dt) else 0.01
         return self._options._replace(dt=dt, posture=1.0 - np.exp(-dt / IDLE))
-
-
-def _enough(frame: Array) -> bool:
-    """Whether a frame can begin a recording: three markers, of half of those there are."""
-    return int(np.isfinite(frame[:, 0]).sum()) >= max(3, len(frame) // 2)
 
 
 def _silent(_: int) -> None:

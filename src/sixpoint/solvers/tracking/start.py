@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,12 +12,82 @@ from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.rigid import fit_rigid
 from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.tracking.engine import packing as tp
+from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine
 
 Array = NDArray[np.float64]
 
+COLD, TIMES_ANEW = 60, 4  # iterations of a first frame, and times that its strays are left out
+CAUTIOUS = 0.1  # damping of a first frame, whose steps are large [m]
+POOR = 0.03  # a first frame that is off by more on average is also begun without limits [m]
 STRAY = 0.1  # a marker that is farther than this from its place in a first frame is no one's [m]
 DOUBTFUL = 0.05  # and one that is farther than this may have another's label [m]
 TIMES = 5.0  # unless others are as far: this times their median
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Finds the pose of a first frame.
+
+    Args:
+        body: What is posed.
+        model: Who moves.
+        engine: Follows markers.
+        starter: Follows them at one level.
+        rest: (2 J + 1, 4) the relaxed posture.
+    """
+
+    body: Articulation
+    model: MarkerModel
+    engine: TrackingEngine
+    starter: TrackingEngine
+    rest: Array
+
+    def begin(self, markers: Array, options: tp.Options) -> tuple[Followed, State]:
+        """A first frame (M, 3) [m]: all markers at one level, from the neutral pose; strays are left out.
+
+        Strays that are where another one should be have each other's labels.
+        """
+        seen, pairs = markers.copy(), []
+        for _ in range(TIMES_ANEW):
+            out, pose = self._begin_with(seen, options)
+            strays = refuse_strays(out.residual[0], out.flags[0], options.gate)
+            if not strays.any():
+                break
+            seen[strays] = np.nan
+        if np.isfinite(options.gate):
+            moving, translations = self.body.place_base(out.rotations, out.positions)
+            places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
+            pairs = find_swaps(markers, places[0], np.isnan(seen[:, 0]))
+        if pairs:
+            for pair in pairs:
+                seen[pair] = markers[pair[::-1]]
+            out, pose = self._begin_with(seen, options)
+        state = self.engine.fresh(pose)
+        out = self.engine.run(seen[None], self.rest, state, options._replace(dt=1e-6, most=10, posture=0.0))
+        state.speed[:] = 0.0
+        state.lag[:] = 0.0
+        out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
+        for pair in pairs:
+            out.flags[0][pair] = tp.SWAPPED
+        return out, state
+
+    def _begin_with(self, seen: Array, options: tp.Options) -> tuple[Followed, Array]:
+        """The better one of two ways to the first pose: within the limits all along, or at last."""
+        cold = options._replace(cold=True, most=COLD, posture=0.02, damping=CAUTIOUS)
+        start = place_base(self.body, self.model, seen)
+        found = []
+        for limits in (True, False):
+            state = self.starter.fresh(start)
+            if not (limits or not options.limits):
+                self.starter.run(seen[None], self.rest, state, cold._replace(limits=False))
+            out = self.starter.run(seen[None], self.rest, state, cold)
+            used = out.flags[0] == tp.USED
+            off = float(np.mean(out.residual[0][used])) if used.any() else 0.0
+            found.append((off, out, state.pose))
+            if off < POOR:
+                break
+        _, out, pose = min(found, key=lambda entry: entry[0])
+        return out, pose
 
 
 def place_base(body: Articulation, model: MarkerModel, markers: Array) -> Array:

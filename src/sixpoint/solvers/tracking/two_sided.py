@@ -14,12 +14,13 @@ from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.gaps import bridge
 from sixpoint.solvers.tracking.model import carrier_of
-from sixpoint.solvers.tracking.running import Followed
+from sixpoint.solvers.tracking.running import Followed, reverse
 
 Array = NDArray[np.float64]
 
 SETTLE = 0.15  # time in which a marker that came back is trusted again [s]
 NEVER = 1.0  # doubt of a marker that was not seen yet [s]
+ASTRAY = 0.15  # a marker that is farther from its place is not followed, though it is used [m]
 EVEN = 0.02  # doubt of both ways where nothing is missing [s]
 
 
@@ -41,7 +42,8 @@ def blend(
     over the markers it carries.
     """
     carries = carried_by(body, model)
-    doubt = doubt_of(ahead.flags, rate) @ carries, doubt_of(back.flags[::-1], rate)[::-1] @ carries
+    doubt = doubt_of(ahead, rate) @ carries, doubt_of(reverse(back), rate)[::-1] @ carries
+    ahead, back = _lend(ahead, back), _lend(back, ahead)
     share = (doubt[0] + EVEN) / (doubt[0] + doubt[1] + 2 * EVEN)
     # In the world: there both ways agree about what markers tell, however they bend the back to it.
     world = _mix(_world(body, ahead), _world(body, back), share)
@@ -71,16 +73,23 @@ def carried_by(body: Articulation, model: MarkerModel) -> Array:
     return np.asarray(carries / np.maximum(carries.sum(axis=0), 1.0))
 
 
-def doubt_of(flags: NDArray[np.int64], rate: float) -> Array:
-    """(F, M) time since each marker was used [s]; after it is back what had grown fades."""
-    out = np.zeros(flags.shape)
+def doubt_of(way: Followed, rate: float) -> Array:
+    """(F, M) time since each marker was followed [s]; after it is back what had grown fades."""
+    followed = np.isin(way.flags, (tp.USED, tp.SWAPPED)) & (way.residual < ASTRAY)
+    out = np.zeros(followed.shape)
     fade = np.exp(-1 / (SETTLE * rate))
-    known = np.where(flags[0] == tp.USED, 0.0, NEVER)
-    for f, row in enumerate(flags):
-        lost = (row == tp.LOST) | (row == tp.REJECTED)
-        known = np.where(lost, known + 1 / rate, known * fade)
+    known = np.where(followed[0], 0.0, NEVER)
+    for f, row in enumerate(followed):
+        known = np.where(row, known * fade, known + 1 / rate)
         out[f] = known
     return out
+
+
+def _lend(way: Followed, other: Followed) -> Followed:
+    """A way whose frames that it did not follow are the other's."""
+    waits = (way.flags == tp.WAITING).all(axis=1)
+    pairs = zip(way, other, strict=True)
+    return Followed(*(np.where(waits.reshape(-1, *(1,) * (a.ndim - 1)), b, a) for a, b in pairs))
 
 
 def _world(body: Articulation, way: Followed) -> Array:

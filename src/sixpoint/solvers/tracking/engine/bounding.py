@@ -111,18 +111,27 @@ def furthest(m, w, places, top, bound, fully):
 
 @helper
 def measure_allowed(m, w, places, speed, top, bound):
-    """How far joints below may move: as their topmost one does, or a bound beyond what markers tell."""
+    """How far joints below may move: a bound beyond what markers tell of their place, or as what carries them.
+
+    The place of a joint is told by the rotation above it; what cannot turn is told with what carries it.
+    """
     joints = len(m.parent)
-    shift = vec.norm(vec.sub(vec.load(w.position, top), vec.load(places[LAST], top)))
-    if top == m.base:
-        shift = 0.0
     for j in range(top, joints):
         if not is_below(m, j, top):
             continue
-        places[MAY, j, 0] = max(shift, bound)
-        if speed[joints + 1 + j, 3] > 0.0 and speed[j, 3] == 0.0:
+        above = m.parent[j]
+        if m.size[j] == 0 and j > top:
+            places[MAY, j, 1] = places[MAY, above, 1]
+        else:
+            places[MAY, j, 1] = 1.0 if speed[joints + 1 + j, 3] > 0.0 and speed[j, 3] == 0.0 else 0.0
+        if (j > top and places[MAY, above, 1] > 0.0) or (j == m.base and places[MAY, j, 1] > 0.0):
             told = vec.norm(vec.sub(vec.load(places[FOUND], j), vec.load(places[BEFORE], j)))
             places[MAY, j, 0] = bound + told
+        elif j > top:
+            places[MAY, j, 0] = places[MAY, above, 0]
+        else:
+            shift = vec.norm(vec.sub(vec.load(w.position, top), vec.load(places[LAST], top)))
+            places[MAY, j, 0] = bound if top == m.base else max(shift, bound)
 
 
 @helper

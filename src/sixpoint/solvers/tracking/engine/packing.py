@@ -20,6 +20,8 @@ MEMORY = 8
 
 USED, LOST, REJECTED, SWAPPED = range(4)
 """What became of a marker in a frame."""
+WAITING = -1
+"""The frame was not followed: it lies before the first, or after the last, that tells a body."""
 
 
 class Options(NamedTuple):
