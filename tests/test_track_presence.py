@@ -1,4 +1,4 @@
-"""People who walk into the cameras' view, out of it and back: where following begins, ends and begins anew."""
+"""People who walk into view, out of it and back: where following begins, ends and begins anew."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def errors(result, truth):
 
 @pytest.mark.parametrize("two_sided", [False, True])
 def test_markers_that_come_and_go_one_by_one(two_sided):
-    """A second in which markers appear, and one in which they vanish, leave the frames between as they were."""
+    """Markers that appear within a second, and vanish within one, leave the frames between as they were."""
     case = body("walk")
     markers = case.markers[:240].copy()
     order = np.random.default_rng(0).permutation(markers.shape[1])
@@ -79,7 +79,7 @@ def test_who_was_lost_is_begun_with_anew():
     "path", [*recordings("c3d/btk_others_Gait.c3d"), *recordings("c3d/opensim_walking2.c3d")]
 )
 def test_people_who_cross_a_laboratory(path):
-    """Gait recordings begin and end with nobody, or a few markers, in view; RMS residual within a centimetre."""
+    """Recordings that begin and end with nobody, or a few markers: an RMS residual within a centimetre."""
     markers = load_markers(path)
     model = calibrate_markers(markers)
     positions = columns_of(model, markers)

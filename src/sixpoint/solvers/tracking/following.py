@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ class Follower:
         state.speed[:, :3] *= -1.0
         state.lag[:] = 0.0
         out = reverse(self._run(markers[last::-1], state, options, progress)[0])
-        beyond = Followed(*(array[-1:] for array in out))
+        beyond = Followed(*(array[-1:] for array in out))  # type: ignore[arg-type]
         out = join([out] + [beyond] * (len(markers) - 1 - last))
         out.flags[last + 1 :] = tp.WAITING
         progress(len(markers))
@@ -133,7 +134,7 @@ def _spans(markers: Array, dt: float) -> list[tuple[int, int]]:
             edges.add(f)
         away = 0.0
     ordered = [*sorted(edges), len(markers)]
-    return list(zip(ordered[:-1], ordered[1:], strict=True))
+    return list(pairwise(ordered))
 
 
 def _used(run: Followed) -> NDArray[np.bool_]:

@@ -111,7 +111,7 @@ def furthest(m, w, places, top, bound, fully):
 
 @helper
 def measure_allowed(m, w, places, speed, top, bound):
-    """How far joints below may move: a bound beyond what markers tell of their place, or as what carries them.
+    """How far joints below may move: a bound beyond what markers tell of their place, or as their parents.
 
     The place of a joint is told by the rotation above it; what cannot turn is told with what carries it.
     """
