@@ -17,7 +17,7 @@ Report = Callable[[int], None]
 
 CHUNK = 64  # frames between two looks at how it goes
 FEW = 3  # markers in fewer than these tell no body
-OFF = 0.08  # markers that are farther off (RMS) are not followed [m]
+OFF = 0.08  # a body is lost where half of its markers are farther off [m]
 PATIENCE = 0.3  # so long [s]; then the next frame with enough of them is begun with
 
 
@@ -137,15 +137,11 @@ def _spans(markers: Array, dt: float) -> list[tuple[int, int]]:
     return list(pairwise(ordered))
 
 
-def _used(run: Followed) -> NDArray[np.bool_]:
-    return np.asarray((run.flags == tp.USED) | (run.flags == tp.SWAPPED))
-
-
 def _follows(run: Followed) -> NDArray[np.bool_]:
-    """(F,) whether enough markers are used and, in the mean square, near their places."""
-    used = _used(run)
-    count = used.sum(axis=1)
-    return np.asarray((count >= FEW) & (np.sum(run.residual**2 * used, axis=1) <= OFF**2 * count))
+    """(F,) whether enough markers are used, and at least half of these near their places."""
+    used = np.isin(run.flags, (tp.USED, tp.SWAPPED))
+    count, near = used.sum(axis=1), np.sum(used & (run.residual <= OFF), axis=1)
+    return np.asarray((count >= FEW) & (2 * near >= count))
 
 
 def _cost(run: Followed) -> float:

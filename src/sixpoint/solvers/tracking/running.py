@@ -56,7 +56,7 @@ class State(NamedTuple):
         pose: (2 J + 1, 4) local rotations, base position, hinge angles, as in prioritized IK.
         speed: (2 J + 1, 4) their rates of change [rad/s, m/s]. The fourth numbers: of joints, time in which
             they may still move to where they were found [s]; of the base, damping of the next frame [m]; of
-            hinges, whether markers told the joint.
+            hinges, whether markers told the joint (1), and did in the frame before (2).
         lag: (2 J + 1, 4) what is shown beside the pose [rad, m], and how fast it fades [1/s].
         markers: (M, 8) per marker: distance from its place in the joint's frame [m], times since it was used
             and since it is refused [s], whether the distance is known, how much of it counts (0 to 1).

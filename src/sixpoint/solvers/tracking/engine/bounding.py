@@ -15,6 +15,7 @@ PACE, STEP = 1.8, 0.03  # how fast, and how far in a frame, at most [m/s, m]
 PARTS, HALVINGS = 6, 3  # of the way that are tried
 GONE = 1e-4  # what is less is nothing [rad, m]
 LAST, FOUND, BEFORE, MAY, ABOVE = range(5)
+TWICE = 2.0  # a joint is told in this frame and was in the one before
 
 
 @helper
@@ -123,7 +124,7 @@ def measure_allowed(m, w, places, speed, top, bound):
         if m.size[j] == 0 and j > top:
             places[MAY, j, 1] = places[MAY, above, 1]
         else:
-            places[MAY, j, 1] = 1.0 if speed[joints + 1 + j, 3] > 0.0 and speed[j, 3] == 0.0 else 0.0
+            places[MAY, j, 1] = 1.0 if speed[joints + 1 + j, 3] == TWICE and speed[j, 3] == 0.0 else 0.0
         if (j > top and places[MAY, above, 1] > 0.0) or (j == m.base and places[MAY, j, 1] > 0.0):
             told = vec.norm(vec.sub(vec.load(places[FOUND], j), vec.load(places[BEFORE], j)))
             places[MAY, j, 0] = bound + told

@@ -9,7 +9,7 @@ from sixpoint.solvers.prioritized.engine.kinematics import compute_world, locals
 from sixpoint.solvers.prioritized.engine.limits import hold_limits
 from sixpoint.solvers.prioritized.engine.packing import BALL, HINGES, unpack_model, unpack_scratch
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.engine.bounding import bound_ends, copy_rows, hold_hinges
+from sixpoint.solvers.tracking.engine.bounding import TWICE, bound_ends, copy_rows, hold_hinges
 from sixpoint.solvers.tracking.engine.improving import ALL, OTHERS, bring_back, improve
 from sixpoint.solvers.tracking.engine.packing import unpack_options
 from sixpoint.solvers.tracking.engine.screening import is_seen, learn_distances, note_astray, screen
@@ -39,19 +39,19 @@ def update_speed(m, state, before, speed, table, flags, dt):
     """Rates of change from two states; they fade where no marker tells, or one is just back."""
     joints = len(m.parent)
     for j in range(joints):
-        speed[joints + 1 + j, 3] = 0.0
+        speed[joints + 1 + j, 3] = -1.0 if speed[joints + 1 + j, 3] > 0.0 else 0.0
     for i in range(len(flags)):
         if flags[i] == tp.USED or flags[i] == tp.SWAPPED:
             j = table[i, tp.JOINT]
-            while j >= 0 and speed[joints + 1 + j, 3] == 0.0:
-                speed[joints + 1 + j, 3] = 1.0
+            while j >= 0 and speed[joints + 1 + j, 3] <= 0.0:
+                speed[joints + 1 + j, 3] = TWICE if speed[joints + 1 + j, 3] < 0.0 else 1.0
                 j = m.parent[j]
     usual = dt / (SMOOTH + dt)
     fade = exp(-dt / COAST)
     for j in range(joints):
         keep, share = 1.0, usual
-        if speed[joints + 1 + j, 3] == 0.0:
-            keep = fade
+        if speed[joints + 1 + j, 3] <= 0.0:
+            keep, speed[joints + 1 + j, 3] = fade, 0.0
         if speed[j, 3] > 0.0:  # it moves to where it is, not as it is
             keep, share = fade, 0.0
         if j == m.base:
@@ -197,7 +197,7 @@ def steady_states(
                     lag[row, k] = 0.0
             continue
         for j in range(joints):
-            speed[joints + 1 + j, 3] = 1.0 if told[f, j] and told[f - 1, j] else 0.0
+            speed[joints + 1 + j, 3] = TWICE if told[f, j] and told[f - 1, j] else 0.0
         for row in range(2 * joints + 1):
             fade_row(lag, row, dt)
             set_pace(lag, row)
