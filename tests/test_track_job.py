@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
+from marker_bodies import walking_markers
 from sixpoint.body.limits import Limits
 from sixpoint.body.markers.recording import Markers
 from sixpoint.cli.app import main
@@ -205,6 +206,19 @@ def test_a_choice_of_markers(files, tmp_path):
     assert done.model.names == names and done.tracked.flags.shape == (FRAMES, 7)
     with pytest.raises(SixpointError, match="no marker KNEE in the model; there are: c7"):
         track(files[0], tmp_path / "b.bvh", following=following(files, markers=("KNEE",)))
+
+
+def test_a_shipped_layout_goes_by_its_name(files, tmp_path, capsys, monkeypatch):
+    """--layout takes markers24 as it takes a file; another name lists those that ship."""
+    from sixpoint.jobs.batch import tracking
+
+    monkeypatch.chdir(tmp_path)
+    tracking.check({"layout": "markers24"})
+    assert main(["track", str(files[0]), "--layout", "markers99"]) == 2
+    assert "one that ships: markers24" in capsys.readouterr().err
+    save_markers(walking_markers(120), tmp_path / "cmu.c3d")
+    assert main(["track", "cmu.c3d", "--layout", "markers24", "-o", "a.bvh"]) == 0
+    assert "over 24 markers" in capsys.readouterr().out
 
 
 def test_what_excludes_each_other_is_said(files, tmp_path):

@@ -40,8 +40,11 @@ def track(
         Path | None, Parameter(help="The same person and markers standing still, to calibrate on.")
     ] = None,
     layout: Annotated[
-        Path | None,
-        Parameter(help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`.'),
+        str | None,
+        Parameter(
+            help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`; or the name '
+            "of one that ships: markers24."
+        ),
     ] = None,
     markers: Annotated[
         str | None, Parameter(help="Follow these labels only: LASI,RASI,LKNE; by default all with a role.")

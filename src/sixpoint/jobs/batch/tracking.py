@@ -10,6 +10,7 @@ import numpy as np
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.markers.model import MarkerModel
+from sixpoint.body.markers.roles import SHIPPED_LAYOUTS
 from sixpoint.errors import SixpointError
 from sixpoint.jobs.reading import ALL, Reading, parse_frames
 from sixpoint.jobs.solving import Solving
@@ -65,7 +66,7 @@ def check(options: Mapping[str, Any]) -> None:
         six.check()
     for name in ("model", "static", "layout", "limits"):
         path = options.get(name)
-        if path is not None and not Path(path).is_file():
+        if path is not None and path not in SHIPPED_LAYOUTS and not Path(path).is_file():
             raise SixpointError(f"--{name} {path}: there is no such file")
 
 

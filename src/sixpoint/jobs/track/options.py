@@ -15,7 +15,7 @@ class Following:
     Attributes:
         model: A saved marker model; None: calibrated on the static trial, or on the recording itself.
         static: A recording of the same person and markers, standing still.
-        layout: A TOML table marker label -> role.
+        layout: A TOML table marker label -> role, or the name of a shipped one.
         markers: Labels to use; empty for all that have a role.
         limits: Keep joints within their limits, widened where the markers themselves contradict them.
         limits_file: A table of joint limits in place of the shipped one; it is not widened.
@@ -25,7 +25,7 @@ class Following:
 
     model: Path | None = None
     static: Path | None = None
-    layout: Path | None = None
+    layout: Path | str | None = None
     markers: tuple[str, ...] = ()
     limits: bool = True
     limits_file: Path | None = None
@@ -35,7 +35,7 @@ class Following:
     @property
     def files(self) -> tuple[Path | None, ...]:
         """What is read beside the recording; None for what is not."""
-        return self.model, self.static, self.layout, self.limits_file
+        return self.model, self.static, None if self.layout is None else Path(self.layout), self.limits_file
 
     def check(self) -> None:
         """Refuse what excludes each other.
