@@ -13,6 +13,8 @@ from sixpoint.solvers.tracking.priorities import find_parts
 
 Array = NDArray[np.float64]
 
+STILL, SPAN = 0.01, 0.06  # a foot that stands stays within this [m] so long before and after [s]
+DRIFT = 0.02  # one that creeps farther than this stands anew [m]
 FADE = 0.06  # time in which a foot goes over from moving to standing, and back [s]
 TIGHT = {"feet": 1e-4}
 """Tolerance that holds feet where their markers are held [m]."""
@@ -20,10 +22,8 @@ TIGHT = {"feet": 1e-4}
 
 def find_stances(model: MarkerModel, motion: Motion) -> NDArray[np.bool_]:
     """(F, 2) frames in which the left and the right foot stand flat: ankle and toes rest."""
-    figure = model.figure
-    feet = [figure.skeleton.subtree(ankle) for ankle in figure.roles.ankle]
-    points = [int(j) for foot in feet for j in (foot[0], foot[-1])]
-    rest = find_contacts(motion.positions[:, points], motion.rate)
+    points = motion.positions[:, _ends(model)]
+    rest = find_contacts(points, motion.rate) & _is_still(points, max(round(SPAN * motion.rate), 1))
     return np.stack([rest[:, 0] & rest[:, 1], rest[:, 2] & rest[:, 3]], axis=1)
 
 
@@ -42,7 +42,8 @@ def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array
         mine = np.flatnonzero(np.isin(model.joints, model.figure.skeleton.subtree(ankle)))
         knee = model.figure.roles.knee[k]
         malleoli = np.flatnonzero(feet & (model.joints == knee))
-        for start, stop in _runs(stances[:, k]):
+        ends = positions[:, _ends(model)[2 * k : 2 * k + 2]]
+        for start, stop in _stands(stances[:, k], ends):
             part = slice(start, stop)
             turn, place = rot.mean(world[part, ankle]), positions[part, ankle].mean(axis=0)
             moved = rot.mul(turn, rot.inv(world[part, ankle]))
@@ -56,6 +57,35 @@ def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array
                     still = np.nanmean(markers[part, i], axis=0)
                     held[part, i] = (1 - share) * markers[part, i] + share * still
     return held, stances
+
+
+def _ends(model: MarkerModel) -> list[int]:
+    """Ankle and toe of the left foot, then of the right."""
+    feet = [model.figure.skeleton.subtree(ankle) for ankle in model.figure.roles.ankle]
+    return [int(j) for foot in feet for j in (foot[0], foot[-1])]
+
+
+def _is_still(points: Array, frames: int) -> NDArray[np.bool_]:
+    """(F, n) whether points (F, n, 3) are near where they were, and will be, so many frames away."""
+    still = np.ones(points.shape[:2], bool)
+    for step in {min(frames, len(points) - 1), min((frames + 1) // 2, len(points) - 1)} - {0}:
+        near = np.linalg.norm(points[step:] - points[:-step], axis=-1) < STILL
+        still[step:] &= near
+        still[:-step] &= near
+    return still
+
+
+def _stands(flags: NDArray[np.bool_], ends: Array) -> list[tuple[int, int]]:
+    """Runs of set flags, cut where an end of the foot (F, 2, 3) has crept away from its place."""
+    found = []
+    for start, stop in _runs(flags):
+        begun = start
+        for f in range(start, stop):
+            if np.linalg.norm(ends[f] - ends[begun], axis=-1).max() > DRIFT:
+                found.append((begun, f))
+                begun = f
+        found.append((begun, stop))
+    return found
 
 
 def _share(frames: int, rate: float) -> Array:
