@@ -4,15 +4,20 @@ Relative mode, joint angles in degrees of chest, shoulders, elbows, hips and kne
 degrees, 95th percentile, largest.
 
 - same rig: solved for the small one against solved for the tall one, both of one rig and its proportions.
-- built-in, points: bend of elbows and knees that the points ask of the built-in figure, against the recorded.
-- built-in, solved: solved for the built-in figure against solved for the tall rig; with six rotations, the
-  same with rotations of all trackers. What differs is how a solver guesses what six points leave open.
-- to the truth: the error against the recording, of the tall rig and of the built-in figure.
+- points: bend of elbows and knees that the points ask of the built-in figure, against the recorded.
+- posed as recorded: the built-in figure, started from the recorded posture, against the recording; with the
+  joint limits of the table and without.
+- posed as reconstructed: the tall rig is solved for its six points alone; the built-in figure, started from
+  that, against it.
+- points alone: solved for the built-in figure from nothing but its points, against solved for the tall rig;
+  with six rotations, the same with rotations of all trackers. What differs is how a solver guesses what six
+  points leave open.
+- to the truth: the error against the recording of what is solved for points alone, of tall rig and built-in.
 
 Absolute mode, residual of standing ankles on the built-in figure, where its legs reach: share below 1 mm,
 99th percentile and largest [mm], with and without joint limits.
 
-    python benchmarks/retargeting.py [--data FOLDER]
+    python benchmarks/retargeting.py [--data FOLDER] [--people 14]
 
 Without recordings the built-in motions are measured: of the built-in figure, of one of other proportions, and
 of one whose spine is straight in the neutral pose.
@@ -30,7 +35,7 @@ from numpy.typing import NDArray
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
-from sixpoint.body.retargeting import carry_trunk
+from sixpoint.body.retargeting import carry_pose, carry_trunk
 from sixpoint.calibration.model import stature_of
 from sixpoint.jobs.retarget import retarget
 from sixpoint.signals.contacts import find_contacts
@@ -38,11 +43,10 @@ from sixpoint.signals.contacts import find_contacts
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 TALL, SMALL = 1.90, 1.20
 FRAMES = 1200  # of each recording, from its beginning
-PATTERNS = (
-    *(f"cmu/{person}_*.amc" for person in ("02", "03", "05", "09", "11", "16", "29", "127")),
-    "bandai/*.bvh",
-    "mass/*.bvh",
-)
+PEOPLE = "02,03,05,09,11,16,29,127"
+EACH = 4  # recordings of each person or folder
+
+CONTACTS = ("limits", "limits, posed", "no limits", "no limits, posed")
 
 Array = NDArray[np.float64]
 
@@ -88,11 +92,11 @@ def asked_bend(figure: sp.Figure, roots: Array, ends: Array) -> Array:
     return np.degrees(np.arccos(np.clip((far**2 - upper**2 - lower**2) / (2 * upper * lower), -1, 1)))
 
 
-def clips(data: Path) -> Iterator[tuple[str, str, sp.Motion]]:
+def clips(data: Path, people: list[str]) -> Iterator[tuple[str, str, sp.Motion]]:
     """Group, name and motion of all recordings; of the built-in motions where there are none."""
     found = False
-    for pattern in PATTERNS:
-        for path in sorted(data.glob(pattern))[:4]:
+    for pattern in (*(f"cmu/{person}_*.amc" for person in people), "bandai/*.bvh", "mass/*.bvh"):
+        for path in sorted(data.glob(pattern))[:EACH]:
             found = True
             yield path.parent.name, path.stem, sp.load(path).sliced(slice(0, FRAMES))
     if found:
@@ -118,7 +122,7 @@ class Measures:
 
     def __init__(self) -> None:
         self.angles: dict[str, list[Array]] = {}
-        self.residuals: dict[str, list[Array]] = {"limits": [], "no limits": []}
+        self.residuals: dict[str, list[Array]] = {name: [] for name in CONTACTS}
 
     def add(self, motion: sp.Motion) -> None:
         """Measure one recording."""
@@ -135,9 +139,19 @@ class Measures:
         moved = retarget(motion, small, source=tall)
         roots = self.roots(tall, motion, small) + moved.positions[:, :1]
         asked = asked_bend(small, roots, moved.positions[:, 2:])
-        self.note("built-in, points", np.abs(asked - recorded_bend(tall, motion)).ravel())
+        self.note("points", np.abs(asked - recorded_bend(tall, motion)).ravel())
+        pose = carry_pose(motion, tall, small)
+        for limits, name in ((True, "posed as recorded"), (False, "the same, no limits")):
+            solver = sp.SequentialIKPlus(small, limits=limits)
+            posed = joint_angles(small, solver.solve_frames(moved, start=pose).motion)
+            self.note(name, between(truth, posed))
+
+        guess = sp.SequentialIKPlus(tall).solve_motion(points)
+        start = carry_pose(guess, tall, small)
+        again = sp.SequentialIKPlus(small).solve_frames(retarget(guess, small, source=tall), start=start)
+        self.note("posed as reconstructed", between(own, joint_angles(small, again.motion)))
         plain = self.solve(small, moved)
-        self.note("built-in, solved", between(own, plain))
+        self.note("points alone", between(own, plain))
         self.note(
             "the same, six rotations",
             between(self.solve(tall, points, sp.EFFECTORS), self.solve(small, moved, sp.EFFECTORS)),
@@ -150,8 +164,10 @@ class Measures:
         reached = np.linalg.norm(hips - kept.positions[:, 4:], axis=2) <= small.limb_lengths[2:]
         stands = find_contacts(points.positions[:, 4:], motion.rate) & reached
         for name in self.residuals:
-            solver = sp.SequentialIKPlus(small, limits=name == "limits")
-            self.residuals[name].append(solver.solve_frames(kept).residual[:, 4:][stands] * 1000.0)
+            solver = sp.SequentialIKPlus(small, limits=not name.startswith("no limits"))
+            begun = {"start": pose} if name.endswith("posed") else {}
+            residual = solver.solve_frames(kept, **begun).residual
+            self.residuals[name].append(residual[:, 4:][stands] * 1000.0)
 
     def note(self, name: str, values: Array) -> None:
         """Keep angles [degrees] under a name."""
@@ -187,8 +203,10 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--data", type=Path, default=DATA, help="folder of recordings")
+    parser.add_argument("--people", default=PEOPLE, help="of the CMU database")
+    args = parser.parse_args()
     groups: dict[str, Measures] = {}
-    for group, _, motion in clips(parser.parse_args().data):
+    for group, _, motion in clips(args.data, args.people.split(",")):
         groups.setdefault(group, Measures()).add(motion)
     for group, measures in groups.items():
         print(group)

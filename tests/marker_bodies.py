@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 import sixpoint as sp
@@ -87,7 +89,9 @@ def misplaced_roles(markers: Markers, roles: dict[str, str]) -> list[str]:
     pairs = [role[2:] for role in at if role.startswith("l_") and f"r_{role[2:]}" in at]
     backs = [at[role] for role in ("l_psis", "r_psis", "sacrum") if role in at]
     if backs:
-        front = np.nanmean([at["l_asis"], at["r_asis"]], axis=0) - np.nanmean(backs, axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # frames in which none is seen
+            front = np.nanmean([at["l_asis"], at["r_asis"]], axis=0) - np.nanmean(backs, axis=0)
     else:
         toe = "toe" if "l_toe" in at else "toe_tip"
         front = at[f"l_{toe}"] - at["l_heel"] + at[f"r_{toe}"] - at["r_heel"]

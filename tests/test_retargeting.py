@@ -11,12 +11,14 @@ from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
 from body_rigs import exercise, family_skeleton, load, real_rigs
+from conftest import recordings
 from sixpoint.body import rotations as rot
 from sixpoint.body.reach import find_lift
 from sixpoint.body.retargeting import ankle_height, carry_points, carry_trunk
+from sixpoint.body.stature import stature_of
 from sixpoint.calibration.person import estimate_figure
 from sixpoint.errors import FigureError, TargetError
-from sixpoint.jobs.retarget import retarget
+from sixpoint.jobs.retarget import retarget, retarget_pose
 from sixpoint.signals.contacts import find_contacts
 
 TALL, SMALL = sp.Figure.from_stature(1.90), sp.Figure.from_stature(1.20)
@@ -264,6 +266,73 @@ def test_gaps_stay_gaps_and_rotations_stay(mode):
     assert out.rate == holes.rate
     solved = retarget(holes, SMALL, mode, source=TALL)
     np.testing.assert_array_equal(solved.tracked, holes.tracked)
+
+
+def turned(figure, motion, joint):
+    """Rotations of a joint in the world, identity in the neutral pose (SciPy)."""
+    return (
+        Rotation.from_quat(motion.transforms[1][:, joint]) * Rotation.from_quat(figure.neutral[joint]).inv()
+    )
+
+
+def joint_angles_between(source, motion, figure, result):
+    """(F, 8) angles by which shoulders and elbows, hips and knees of two bodies differ [degrees]."""
+    off = []
+    for limb in range(4):
+        joints = []
+        for f in (source, figure):
+            first = f.roles.clavicle[0] if f.roles.clavicle else f.roles.shoulder[0]
+            joints.append([f.skeleton.parents[first] if limb < 2 else f.roles.pelvis, *f.roles.limbs[limb]])
+        for k in range(2):
+            a, b = (
+                turned(f, m, row[k]).inv() * turned(f, m, row[k + 1])
+                for f, m, row in ((source, motion, joints[0]), (figure, result, joints[1]))
+            )
+            off.append(np.degrees((a.inv() * b).magnitude()))
+    return np.stack(off, axis=1)
+
+
+@pytest.mark.parametrize("source", [TALL, STOCKY, OTHER], ids=["same", "stocky", "another rig"])
+def test_a_carried_pose_has_the_same_joint_angles(source):
+    """Every limb of another body is turned as the source's: chest, shoulders, elbows, hips, knees."""
+    motion = exercise(source)
+    pose = retarget_pose(motion, SMALL, source=source)
+    assert pose.skeleton is SMALL.skeleton and len(pose) == len(motion) and pose.rate == motion.rate
+    for joint in ("pelvis", "shoulder", "elbow", "wrist", "hip", "knee", "ankle"):
+        ours, theirs = (np.atleast_1d(getattr(f.roles, joint)) for f in (source, SMALL))
+        for a, b in zip(ours, theirs, strict=True):
+            apart = turned(source, motion, a).inv() * turned(SMALL, pose, b)
+            assert np.degrees(apart.magnitude()).max() < 1e-5, joint
+
+
+@pytest.mark.parametrize("source", [STOCKY, OTHER], ids=["stocky", "another rig"])
+def test_a_pose_to_start_from_is_kept(source):
+    """Points that lead a body from the carried pose: they are met, and the pose stays within some degrees."""
+    motion = sample("walk", source)
+    points, pose = retarget(motion, SMALL, source=source), retarget_pose(motion, SMALL, source=source)
+    solver = sp.SequentialIKPlus(SMALL, limits=False, rotations=sp.EFFECTORS)
+    started, alone = solver.solve_frames(points, start=pose), solver.solve_frames(points)
+    assert started.residual.max() < 1e-3
+    off, was = (joint_angles_between(source, motion, SMALL, s.motion).mean() for s in (started, alone))
+    assert off < 3.0 and off < 0.5 * was
+
+
+@pytest.mark.parametrize("path", recordings("cmu/02_0[1-3].amc") + recordings("cmu/1[46]_01.amc"))
+def test_real_recordings_keep_their_pose_on_a_small_avatar(path):
+    """A person of 1.90 m on 1.20 m: joint angles within 3 degrees in the mean, elbows and knees all but."""
+    motion = load(path).sliced(slice(0, 400))
+    source = sp.Figure.from_motion(motion)
+    size = 1.9 / stature_of(source)
+    s = motion.skeleton
+    tall = replace(s, offsets=s.offsets * size, site_offsets=s.site_offsets * size)
+    motion = replace(motion, skeleton=tall, translations=motion.translations * size)
+    source = sp.Figure.from_motion(motion)
+    points, pose = retarget(motion, SMALL, source=source), retarget_pose(motion, SMALL, source=source)
+    solved = sp.SequentialIKPlus(SMALL, limits=False).solve_frames(points, start=pose)
+    off = joint_angles_between(source, motion, SMALL, solved.motion)
+    assert solved.residual.max() < 1e-3
+    assert off.mean() < 3.0
+    assert np.mean(off[:, 1::2] < 3.0) > 0.95
 
 
 def test_bare_points_are_solved_once():

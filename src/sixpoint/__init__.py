@@ -40,7 +40,7 @@ from sixpoint.formats import (
     save_targets,
 )
 from sixpoint.jobs.marker_models import load_marker_model, save_marker_model
-from sixpoint.jobs.retarget import retarget
+from sixpoint.jobs.retarget import retarget, retarget_pose
 from sixpoint.samples import SAMPLES, make_sample
 from sixpoint.solvers.base import MotionSolution, Solution, Solver, Status
 from sixpoint.solvers.ccd.solver import CyclicCoordinateDescent
@@ -158,6 +158,7 @@ __all__ = [
     "make_sample",
     "make_solver",
     "retarget",
+    "retarget_pose",
     "save",
     "save_angles",
     "save_marker_model",

@@ -109,6 +109,24 @@ def carry_trunk(posed: Motion, source: Figure, figure: Figure) -> Motion:
     trunk, see ``SpineChain.stations``.
     """
     world = rot.mul(posed.transforms[1], rot.inv(source.neutral))
+    return _pose(figure, _turn_trunk(world, source, figure), posed.rate)
+
+
+def carry_pose(posed: Motion, source: Figure, figure: Figure) -> Motion:
+    """The posture on another rig: trunk as ``carry_trunk`` has it, limbs turned in the world as they were.
+
+    So joint angles stay. Wrists and ankles are where ``carry_points`` puts them only if the parts of a limb
+    are in proportion; a solver that takes a pose to start from brings them there.
+    """
+    world = rot.mul(posed.transforms[1], rot.inv(source.neutral))
+    wished = _turn_trunk(world, source, figure)
+    for ours, theirs in zip(source.roles.limbs, figure.roles.limbs, strict=True):
+        wished |= {b: world[:, a] for a, b in zip(ours, theirs, strict=True)}
+    return _pose(figure, wished, posed.rate)
+
+
+def _turn_trunk(world: Array, source: Figure, figure: Figure) -> dict[int, Array]:
+    """Trunk joints of a figure -> rotations (F, 4) in the world, as the source's (F, J, 4) are."""
     stations = _stations(source)
     at: list[float] = []
     turns: list[Array] = []
@@ -124,11 +142,17 @@ def carry_trunk(posed: Motion, source: Figure, figure: Figure) -> Motion:
         wished[joint] = _interpolate(np.array(at), curve, _stations(figure)[joint])
     if source.roles.clavicle:
         wished |= {b: world[:, a] for a, b in zip(source.roles.clavicle, figure.roles.clavicle, strict=False)}
-    local = np.tile(rot.IDENTITY, (len(posed), len(figure.skeleton), 1))
+    return wished
+
+
+def _pose(figure: Figure, wished: dict[int, Array], rate: float) -> Motion:
+    """A motion in which some joints are turned in the world as wished (F, 4), and the others rest on them."""
+    frames = len(wished[figure.roles.pelvis])
+    local = np.tile(rot.IDENTITY, (frames, len(figure.skeleton), 1))
     for joint, turn in wished.items():
         above = next((j for j in figure.skeleton.path(0, joint)[-2::-1] if j in wished), None)
         local[:, joint] = turn if above is None else rot.mul(rot.inv(wished[above]), turn)
-    return figure.compute_motion(local, np.zeros((len(posed), 3)), posed.rate)
+    return figure.compute_motion(local, np.zeros((frames, 3)), rate)
 
 
 # --- proportions ---------------------------------------------------------------------------------

@@ -132,7 +132,9 @@ def _show(screen: Screen, done: Batch, job: str, out: Path) -> None:
         rows.append(("failed", str(failed)))
     screen.rows([*rows, *_headline(done, job)])
     for outcome in done.failures[:LISTED]:
-        screen.note(f"{outcome.label}: {outcome.error}", "failed", "red")
+        reason = outcome.error.removeprefix(f"{done.library.root}{os.sep}")
+        said = reason if reason.startswith(outcome.label) else f"{outcome.label}: {reason}"
+        screen.note(said, "failed", "red")
     if failed > LISTED:
         screen.note(f"{failed - LISTED} more are in the summary", "failed", "red")
     screen.say(f"wrote {out}{os.sep}: {', '.join(path.name for path in done.files)}", style="green")

@@ -62,7 +62,9 @@ def _load_arrays(path: Path) -> dict[str, Array]:
     except FormatError:
         raise
     except Exception as error:  # NumPy and zipfile raise many kinds on damaged archives
-        raise FormatError(path, f"not an NPZ file, or a damaged one: {error}") from error
+        raise FormatError(
+            path, "not an NPZ file, or a damaged one", expected="arrays of numbers and texts as np.savez writes"
+        ) from error
     return arrays
 
 

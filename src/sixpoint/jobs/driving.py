@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,14 @@ import numpy as np
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
-from sixpoint.body.retargeting import Mode
+from sixpoint.body.retargeting import Mode, carry_points, carry_pose
 from sixpoint.body.spine_chain import SpineChain
-from sixpoint.body.targets import Targets
+from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import GLTF_SUFFIXES, Avatar, load_avatar
 from sixpoint.formats.suffixes import with_path
 from sixpoint.jobs.progress import Progress, silent
-from sixpoint.jobs.retarget import retarget
+from sixpoint.jobs.retarget import find_posture
 from sixpoint.jobs.solving import Solved, Solving, solve
 
 SAME = 1e-3
@@ -68,6 +69,9 @@ def drive(
 ) -> tuple[Targets, Solved]:
     """Pose a figure as another body was.
 
+    The six points lead. A method that can do so starts from the posture as it was, and turns pelvis, head,
+    hands and feet as a motion has them; with ``solving.rotations`` only those that are named there.
+
     Args:
         figure: Whom to pose.
         recording: A motion, or six points.
@@ -82,5 +86,9 @@ def drive(
     Raises:
         SixpointError: The recording's body cannot be found, or an option is unknown.
     """
-    targets = retarget(recording, figure, mode, source=source)
-    return targets, solve(figure, targets, solving or Solving(), progress)
+    points, posed, owner = find_posture(recording, source)
+    targets, pose = carry_points(points, posed, owner, figure, mode), carry_pose(posed, owner, figure)
+    solving = solving or Solving()
+    if isinstance(recording, Motion) and not solving.rotations and solving.takes("rotations"):
+        solving = replace(solving, rotations=EFFECTORS)
+    return targets, solve(figure, targets, solving, progress, start=pose)

@@ -1,4 +1,4 @@
-"""A recording of one body, or its six points, as the six points of another body."""
+"""A recording of one body, or its six points, as the six points and the posture of another body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.reach import Ends
-from sixpoint.body.retargeting import Mode, carry_points
+from sixpoint.body.retargeting import Mode, carry_points, carry_pose
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.calibration.person import estimate_figure
 from sixpoint.errors import TargetError
@@ -47,19 +47,45 @@ def retarget(
         TargetError: Nothing tells the lengths of the source, or the mode is unknown.
         FigureError: The recording's rig is no human's, or not the source's.
     """
+    points, posed, owner = find_posture(recording, source, method)
+    return carry_points(points, posed, owner, figure, mode, floor, first)
+
+
+def retarget_pose(
+    recording: Motion | Targets,
+    figure: Figure,
+    *,
+    source: Figure | float | None = None,
+    method: str = DEFAULT,
+) -> Motion:
+    """The posture of one body on another one, for a solver to start from.
+
+        points, pose = sp.retarget(tall, avatar), sp.retarget_pose(tall, avatar)
+        result = sp.SequentialIKPlus(avatar).solve_frames(points, start=pose).motion
+
+    Joint angles are the recording's, of bare points those that the method finds on the source. The pelvis
+    stays at the origin: where the body goes, ``retarget`` says, whose arguments and errors these are.
+    """
+    _, posed, owner = find_posture(recording, source, method)
+    return carry_pose(posed, owner, figure)
+
+
+def find_posture(
+    recording: Motion | Targets, source: Figure | float | None = None, method: str = DEFAULT
+) -> tuple[Targets, Motion, Figure]:
+    """Six points of a recording, its posture, and whose they are; see ``retarget``."""
     if isinstance(recording, Motion):
         if isinstance(source, (int, float)):
             raise TargetError("a motion has a rig of its own: give its figure as the source, or nothing")
         owner = source or Figure.from_motion(recording)
-        return carry_points(owner.targets(recording), recording, owner, figure, mode, floor, first)
+        return owner.targets(recording), recording, owner
     if not isinstance(recording, Targets):
         raise TargetError(f"a recording is a Motion or Targets, got {type(recording).__name__}")
     if source is None:
         source = estimate_figure(recording)
     elif not isinstance(source, Figure):
         source = Figure.from_stature(source)
-    posed = _solve(recording, source, method)
-    return carry_points(recording, posed, source, figure, mode, floor, first)
+    return recording, _solve(recording, source, method), source
 
 
 def _solve(targets: Targets, source: Figure, method: str) -> Motion:

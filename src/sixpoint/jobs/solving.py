@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
+from sixpoint.body.motion import Motion
 from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import SixpointError, listed
@@ -60,6 +63,10 @@ class Solving:
                 hint = f"; {listed(having)} have it: add --method {having[0]}" if having else ""
                 raise SixpointError(f"the method {self.method!r} has no option {name}{hint}")
         make_solver(self.method, Figure.from_stature(), **self.options)
+
+    def takes(self, option: str) -> bool:
+        """Whether the method has an option."""
+        return option in find_options(find_solver(self.method))
 
     @property
     def options(self) -> dict[str, Any]:
@@ -138,15 +145,35 @@ class Solved:
     inside: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
-def solve(figure: Figure, targets: Targets, solving: Solving, progress: Progress = silent) -> Solved:
-    """Pose a figure for every frame; kernels are compiled before the clock starts."""
+def solve(
+    figure: Figure,
+    targets: Targets,
+    solving: Solving,
+    progress: Progress = silent,
+    *,
+    start: Motion | None = None,
+) -> Solved:
+    """Pose a figure for every frame; kernels are compiled before the clock starts.
+
+    Args:
+        figure: Whom to pose.
+        targets: Where its six points shall be.
+        solving: Method and options.
+        progress: Told how far the work is.
+        start: Postures to start from, one for each frame; not used by methods that take none.
+    """
     if solving.avoid and figure.shape is None:
         figure = figure.with_shape(build_shape(figure))
     solver = make_solver(solving.method, figure, **solving.options)
     solver.warm_up()
-    solver.solve_frames(targets.sliced(slice(0, 1)))  # arrays of the kind that follow
-    start = time.perf_counter()
-    solution = solver.solve_frames(targets, lambda done: progress("solving", done, len(targets)))
-    seconds = (time.perf_counter() - start) / len(targets)
+    run: Callable[..., MotionSolution] = solver.solve_frames
+    first = run
+    one = slice(0, 1)
+    if start is not None and getattr(solver, "takes_start", False):
+        run, first = partial(run, start=start), partial(run, start=start.sliced(one))
+    first(targets.sliced(one))  # arrays of the kind that follow
+    begun = time.perf_counter()
+    solution = run(targets, lambda done: progress("solving", done, len(targets)))
+    seconds = (time.perf_counter() - begun) / len(targets)
     inside = find_penetration(figure, solution.motion, solving.avoid) if solving.avoid else {}
     return Solved(solution, seconds, inside)

@@ -81,6 +81,13 @@ def _sets() -> dict[str, dict[str, str]]:
     return {table["name"]: _expanded(table["labels"]) for table in _tables()["sets"]}
 
 
+@cache
+def _companions() -> dict[str, list[str]]:
+    """Sets that explain no label of a file unless they, or one of these, explain most of it."""
+    sets = [table for table in _tables()["sets"] if "only_beside" in table]
+    return {table["name"]: [table["name"], *table["only_beside"]] for table in sets}
+
+
 def _expanded(labels: Mapping[str, str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for label, role in labels.items():
@@ -173,6 +180,8 @@ def _match_sets(bare: Mapping[str, str]) -> tuple[str, float, dict[str, str]]:
     found: dict[str, str] = {}
     share = 0.0
     for name in order:
+        if order[0] not in _companions().get(name, order):
+            continue
         known = _sets()[name]
         for label, short in bare.items():
             role = _look_up(short, known)

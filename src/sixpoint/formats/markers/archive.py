@@ -36,7 +36,9 @@ def read_marker_npz(path: Path) -> RawMarkers:
     except FormatError:
         raise
     except Exception as error:  # NumPy and zipfile raise many kinds on damaged archives
-        raise FormatError(path, f"not an NPZ file, or a damaged one: {error}") from error
+        raise FormatError(
+            path, "not an NPZ file, or a damaged one", expected="arrays of numbers and texts as np.savez writes"
+        ) from error
     for name in ("names", "positions", "rate"):
         if name not in arrays:
             raise FormatError(path, f"array {name!r} is missing; arrays: {listed(there) or 'none'}")

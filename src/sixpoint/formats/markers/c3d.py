@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.markers.recording import Event
-from sixpoint.errors import FormatError
+from sixpoint.errors import FormatError, listed
 from sixpoint.formats.markers.c3d_sections import (
     BLOCK,
     Header,
@@ -65,8 +65,9 @@ def read_c3d(path: Path) -> RawMarkers:
     if not keep:
         raise FormatError(path, "all points are angles, forces or other results of models: no markers")
     first = _first_frame(header, parameters)
+    descriptions = texts(parameters, "POINT", "DESCRIPTIONS") + [""] * header.points
     return RawMarkers(
-        [names[k] for k in keep],
+        _tell_apart([names[k] for k in keep], [descriptions[k].strip() for k in keep], notes),
         positions[:, keep],
         rate,
         residuals[:, keep],
@@ -151,6 +152,26 @@ def _read_points(path: Path, data: bytes, header: Header, parameters: Parameters
     residuals = (masks & 0xFF).astype(np.float64) * abs(scale)
     positions[masks < 0] = np.nan
     return positions, residuals
+
+
+def _tell_apart(names: list[str], descriptions: list[str], notes: list[str]) -> list[str]:
+    """Labels that repeat, replaced by their descriptions where these differ.
+
+    Systems of the time when a label had four letters call both sides of a knee RKNE, and describe them as
+    R.Knee and R.Knee.Medial.
+    """
+    taken, found, said = set(names), list(names), []
+    for name in dict.fromkeys(names):
+        places = [k for k, other in enumerate(names) if other == name]
+        fresh = [descriptions[k] for k in places]
+        if name and len(places) > 1 and all(fresh) and len({*fresh, *taken}) == len(fresh) + len(taken):
+            for k, text in zip(places, fresh, strict=True):
+                found[k] = text
+            taken.update(fresh)
+            said.append(f"{name} ({', '.join(fresh)})")
+    if said:
+        notes.append(f"labels that repeat are called as they are described: {listed(said, 8)}")
+    return found
 
 
 def _keep_positions(names: list[str], parameters: Parameters, notes: list[str]) -> list[int]:
