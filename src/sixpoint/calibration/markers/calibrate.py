@@ -27,12 +27,13 @@ from sixpoint.calibration.markers.places import Places, place_markers
 from sixpoint.calibration.markers.problem import Problem, State, solve_all, solve_poses
 from sixpoint.calibration.markers.recordings import read_recordings
 from sixpoint.calibration.markers.stature import estimate_stature
+from sixpoint.calibration.markers.wrists import place_wrist_bars
 
 Array = NDArray[np.float64]
 
 FRAMES, STATIC_FRAMES = 100, 10
-SIGMAS = (0.02, 0.01)  # of a marker around its place, in turn [m]; then what is found, within SIGMA_RANGE
-SIGMA_RANGE = (0.004, 0.012)
+SIGMAS = (0.02, 0.01)  # of a usual marker around its place, in turn [m]; then what is found
+SIGMA_RANGE = (0.007, 0.012)  # residuals do not show what lengths and places have taken from sliding skin
 ROUGH = 1e-3  # gain of a step, as a share of the cost, at which a first round ends
 UNFIT = 2.5  # frames whose residual is this many times the median's are left out
 
@@ -77,7 +78,7 @@ def calibrate_markers(
     found, observed = read_recordings(recordings, layout)
     together = np.concatenate(observed)
     stature = estimate_stature(found, together, kinematics)
-    places = place_markers(found, stature, kinematics)
+    places = place_wrist_bars(place_markers(found, stature, kinematics), together, stature)
     offsets, hips = regress_pelvis(places, together)
     places = replace(places, offsets=offsets)
     expected, information = expect_lengths(stature, hips)

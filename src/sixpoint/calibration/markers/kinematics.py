@@ -39,11 +39,21 @@ class Block:
     range: tuple[float, float] = (-np.inf, np.inf)
 
 
+SUBTALAR = np.radians([42.0, 23.0])
+"""The axis of inversion rises to the front and points inward [rad]; Inman 1976, "The joints of the ankle"."""
+
+
+def _subtalar_axis(side: str) -> Array:
+    rise, inward = SUBTALAR
+    forward = np.array([-np.sin(inward) if side == "l" else np.sin(inward), 0.0, np.cos(inward)])
+    return np.asarray(np.cos(rise) * forward + np.sin(rise) * Y)
+
+
 def _limb_blocks(side: str) -> list[Block]:
     return [
         Block((f"{side}_hip",), (40, 20, 30)),
         Block((f"{side}_knee",), (60,), (X,), (0, 160)),
-        Block((f"{side}_ankle",), (25, 12), (X, Z)),
+        Block((f"{side}_ankle",), (25, 12), (X, _subtalar_axis(side))),
         Block((f"{side}_sternoclavicular",), (8, 10, 10)),
         Block((f"{side}_shoulder",), (60, 50, 60)),
         Block((f"{side}_elbow",), (60, 45), (X, Y), (-155, 0)),
@@ -53,8 +63,8 @@ def _limb_blocks(side: str) -> list[Block]:
 
 BLOCKS = (
     Block(("humanoid_root",), (np.inf, np.inf, np.inf)),
-    Block(("vl5", "vl1"), (25, 15, 20)),
-    Block(("vt6", "vt1"), (12, 15, 10)),
+    Block(("vl5", "vl1"), (25, 6, 15)),
+    Block(("vt6", "vt1"), (12, 20, 12)),
     Block(("vc4", "skullbase"), (30, 35, 20)),
     *_limb_blocks("l"),
     *_limb_blocks("r"),

@@ -32,6 +32,7 @@ class Places:
         reach: (M, 3, K) per segment length.
         offsets: (M, 3) expected [m].
         std: (M, 3) standard deviations of these [m].
+        skin: (M,) how far the skin slides under each marker, relative to what is usual.
     """
 
     names: tuple[str, ...]
@@ -41,6 +42,7 @@ class Places:
     reach: Array
     offsets: Array
     std: Array
+    skin: Array
 
     def columns(self, *roles: str) -> list[int]:
         """Markers with any of some roles."""
@@ -76,6 +78,7 @@ def place_markers(found: MarkerRoles, stature: float, kinematics: Kinematics) ->
         np.array([_anchor(kinematics, row[1]) - _anchor(kinematics, row[0]) for row in rows]),
         np.array([row[2] for row in rows], float) * scale,
         np.array([row[3] for row in rows], float) * scale,
+        np.array([_skin(found.segments[label]) for label in found.roles]),
     )
 
 
@@ -104,6 +107,13 @@ def _row(role: str, segment: str) -> tuple[str, str, list[float], list[float]]:
     mirror = -1.0 if side == "r_" else 1.0
     place = [mirror * offset[0], offset[1], offset[2]]
     return carrier.replace("*_", side), anchor.replace("*_", side), place, std
+
+
+def _skin(segment: str) -> float:
+    """How far skin slides on a segment [cm], relative to a usual one [cm]."""
+    skin: Mapping[str, float] = _table()["skin"]
+    bare = segment[2:] if segment[:2] in ("l_", "r_") else segment
+    return float(skin.get(bare, skin["usual"])) / float(skin["usual"])
 
 
 def pelvic_tilt() -> float:

@@ -93,13 +93,14 @@ class Problem:
 
     def _weights(self, errors: Array) -> Array:
         square = np.sum(errors**2, axis=-1)
-        return np.asarray(self.seen / (1.0 + square / OUTLIER**2) / self.sigma**2)
+        return np.asarray(self.seen / (1.0 + square / OUTLIER**2) / (self.sigma * self.places.skin) ** 2)
 
     def frame_costs(self, state: State) -> Array:
         """(F,) what each frame's pose is charged."""
         errors = self.filled - self.predict(state)[0]
         square = np.sum(errors**2, axis=-1)
-        cost = np.sum(self.seen * np.log1p(square / OUTLIER**2), axis=1) * (OUTLIER / self.sigma) ** 2
+        charged = np.log1p(square / OUTLIER**2) * (OUTLIER / self.sigma / self.places.skin) ** 2
+        cost = np.sum(self.seen * charged, axis=1)
         cost += np.sum((state.poses / self.pose_std) ** 2, axis=1)
         for column, low, high in self._hinges:
             over = state.poses[:, column] - np.clip(state.poses[:, column], low, high)
