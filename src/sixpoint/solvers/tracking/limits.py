@@ -1,8 +1,9 @@
-"""Limits that the markers themselves contradict: found by following without any, and widened by as much."""
+"""Limits that the markers themselves contradict: found by following within and without, and widened."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from sixpoint.body.dofs import Dofs
 from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.widening import widen
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.solver import MarkerTracker
+from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedMotion
 from sixpoint.solvers.tracking.two_sided import carried_by
 
 Array = NDArray[np.float64]
@@ -20,6 +21,11 @@ Array = NDArray[np.float64]
 SEEN = 0.9  # share of the markers on and below a joint that say how it is
 FAR = 2.0  # frames farther off than this times the median's residual say nothing
 LEAST = np.radians(1.0)  # what is less is noise [rad]
+WORSE, MORE = (
+    1.1,
+    5e-4,
+)  # limits cost something where markers are off by so many times, and by so much more [m]
+FINE = 60.0  # every so manieth frame is looked at that leaves this rate [Hz]
 
 
 def widen_limits(
@@ -31,7 +37,8 @@ def widen_limits(
     """Limits within which the figure can follow its markers.
 
     Limits are a table of people. This person may go beyond it, and a calibration whose neutral posture is a
-    few degrees off moves every angle by as much. Where markers tell a joint well, they are believed.
+    few degrees off moves every angle by as much. Where markers tell a joint well, and those on and below it
+    are farther off within the limits than without, they are believed.
 
     Args:
         model: Who moves.
@@ -42,19 +49,38 @@ def widen_limits(
     Returns:
         What may move and how far, and name of a joint -> growth of its limits [rad], the largest first.
     """
-    dofs = model.figure.full_dofs()
-    tracker = MarkerTracker(model, limits=False, dofs=dofs)
-    free = tracker.solve_frames(markers, rate, two_sided=False, progress=progress)
-    body, used = tracker.body, free.flags == tp.USED
-    told = used @ carried_by(body, model) > SEEN
+    dofs, step = model.figure.full_dofs(), max(1, int(rate / FINE))
+    thin, trackers = markers[::step], [MarkerTracker(model, limits=keep, dofs=dofs) for keep in (True, False)]
+
+    def tell(way: int, done: int) -> None:
+        if progress:
+            progress((way * len(markers) + done * step) // 2)
+
+    kept, free = (
+        tracker.solve_frames(thin, rate / step, two_sided=False, progress=partial(tell, k))
+        for k, tracker in enumerate(trackers)
+    )
+    body, used = trackers[0].body, free.flags == tp.USED
+    carries = carried_by(body, model)
+    costly = _misses(kept, carries) > WORSE * _misses(free, carries) + MORE
+    told = used @ carries > SEEN
     off = np.sqrt(np.sum(free.residual**2 * used, axis=1) / np.maximum(used.sum(axis=1), 1))
     good = off <= FAR * np.median(off) + 1e-4
     before, after = rot.inv(body.before), rot.inv(body.neutral)
     local = rot.mul(rot.mul(before, free.motion.rotations), after)
     joints, grown = dict(dofs.joints), {}
     for joint, dof in dofs.joints.items():
+        if not costly[joint]:
+            continue
         wider, by = widen(dof, local[good & told[:, joint], joint])
         if by > LEAST:
             joints[joint] = wider
             grown[model.figure.skeleton.names[joint]] = by
     return Dofs(joints, dofs.free_root), dict(sorted(grown.items(), key=lambda entry: -entry[1]))
+
+
+def _misses(way: TrackedMotion, carries: Array) -> Array:
+    """(J,) RMS distance of the markers on and below each joint from their places [m]."""
+    used = way.flags == tp.USED
+    squares, count = (np.sum(each @ carries, axis=0) for each in (way.residual**2 * used, used))
+    return np.asarray(np.sqrt(squares / np.maximum(count, 1e-9)))

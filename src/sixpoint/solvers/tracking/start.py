@@ -72,14 +72,17 @@ class Beginning:
         return out, state
 
     def _begin_with(self, seen: Array, options: tp.Options) -> tuple[Followed, Array]:
-        """The better one of two ways to the first pose: within the limits all along, or at last."""
+        """The better one of two ways to the first pose: within human limits first, or without any.
+
+        Limits lead elbows and knees to the right side also where they are not kept in the end.
+        """
         cold = options._replace(cold=True, most=COLD, posture=0.02, damping=CAUTIOUS)
         start = place_base(self.body, self.model, seen)
         found = []
         for limits in (True, False):
             state = self.starter.fresh(start)
-            if not (limits or not options.limits):
-                self.starter.run(seen[None], self.rest, state, cold._replace(limits=False))
+            if limits != options.limits:
+                self.starter.run(seen[None], self.rest, state, cold._replace(limits=limits))
             out = self.starter.run(seen[None], self.rest, state, cold)
             used = out.flags[0] == tp.USED
             off = float(np.mean(out.residual[0][used])) if used.any() else 0.0
