@@ -1,7 +1,8 @@
-"""Avatars that move as somebody else did: retargeted six points, posed on the avatar's own bones."""
+"""Avatars that move as somebody else did: retargeted six points, posed on the avatar's own bones, soles on the floor."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
 from sixpoint.body.retargeting import Mode
+from sixpoint.body.soles import ankle_height, find_floor
 from sixpoint.body.spine_chain import SpineChain
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
@@ -18,9 +20,12 @@ from sixpoint.formats.suffixes import with_path
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.retarget import retarget
 from sixpoint.jobs.solving import Solved, Solving, solve
+from sixpoint.live.feet import Floor, level_feet
 
 SAME = 1e-3
 """Part of a body's height within which bones are the same."""
+NEAR = 0.1
+"""Part of a body's height within which soles that stand are on the floor at zero."""
 AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
 AVATARS = tuple(suffix for suffix in GLTF_SUFFIXES if suffix != ".vrma")
 
@@ -66,7 +71,7 @@ def drive(
     solving: Solving | None = None,
     progress: Progress = silent,
 ) -> tuple[Targets, Solved]:
-    """Pose a figure as another body was.
+    """Pose a figure as another body was; feet without a measured rotation are flat where they stand.
 
     Args:
         figure: Whom to pose.
@@ -83,4 +88,18 @@ def drive(
         SixpointError: The recording's body cannot be found, or an option is unknown.
     """
     targets = retarget(recording, figure, mode, source=source)
-    return targets, solve(figure, targets, solving or Solving(), progress)
+    solving = solving or Solving()
+    solved = solve(figure, targets, solving, progress)
+    measured = () if targets.rotations is None else solving.rotations
+    level = _level(figure, solved.solution.motion, ("l_ankle" not in measured, "r_ankle" not in measured))
+    return targets, replace(solved, solution=replace(solved.solution, motion=level))
+
+
+def _level(figure: Figure, motion: Motion, free: tuple[bool, bool]) -> Motion:
+    """A motion whose low feet are flat on the floor, if it is a motion on a floor."""
+    height = find_floor(figure, motion)
+    if not any(free) or abs(height) > NEAR * figure.height:
+        return motion
+    floor = replace(Floor.under(figure, height), ankle=ankle_height(figure))
+    poses = (level_feet(figure, motion.pose(k), floor, free=free) for k in range(len(motion)))
+    return replace(motion, rotations=np.array([pose.rotations for pose in poses]))

@@ -13,6 +13,7 @@ from math import acos, asin, cos, sin
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
+from sixpoint.body.soles import measure_feet
 from sixpoint.body.stature import stature_of
 from sixpoint.calibration.model import ANKLE_HEIGHT
 from sixpoint.kernels import quaternion as qt
@@ -34,18 +35,22 @@ class Floor:
     Attributes:
         stature: Of the figure [m].
         ankle: Height of its ankles over the floor in standing [m].
+        toes: How far the tips of its toes are before the ankle [m].
         height: Of the floor [m].
     """
 
     stature: float
     ankle: float
+    toes: float
     height: float = 0.0
 
     @classmethod
     def under(cls, figure: Figure, height: float = 0.0) -> Floor:
-        """The floor under a figure of average proportions, whose ankles are 0.039 of the stature over it."""
+        """The floor under a figure: its feet are those of its skin, else of average proportions."""
         stature = stature_of(figure)
-        return cls(stature, ANKLE_HEIGHT * stature, height)
+        skin = measure_feet(figure)
+        ankle, toes = (ANKLE_HEIGHT * stature, TOES * stature) if skin is None else skin
+        return cls(stature, ankle, toes, height)
 
 
 def level_feet(
@@ -88,7 +93,7 @@ def _level(now: Quaternion, height: float, lean: float, floor: Floor) -> Quatern
     size = vec.norm(qt.log(change))
     turn = qt.mul(qt.scaled(change, min(weight * upright, FLEX / max(size, 1e-9))), now)
     # The tips of the toes are at least on the floor: a foot that points lower is turned up.
-    toes = qt.mul_vec(turn, (0.0, -floor.ankle, TOES * floor.stature))
+    toes = qt.mul_vec(turn, (0.0, -floor.ankle, floor.toes))
     least = -(height + floor.ankle)
     if toes[1] < least and upright > 0.0:
         reach = vec.norm(toes)
