@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
-from conftest import recordings, unmeasured
+from conftest import recordings
 from gltf_avatars import EXTENSIONS, STYLES, make_avatar
 from node_packages import node_modules
 from sixpoint.body.motion import Motion
@@ -149,7 +149,6 @@ def test_the_validator_finds_no_error_in_what_we_write(tmp_path, boxing):
     assert errors([*files, tmp_path / "one_frame.glb"]) == {}
 
 
-@unmeasured
 @pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_the_validator_finds_no_error_in_driven_characters(path, data, tmp_path):
     """Characters of others, driven by the paper's boxing clip, are valid when they are written."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
-from conftest import recordings, unmeasured
+from conftest import recordings
 from gltf_avatars import BONES, EXTENSIONS, STYLES, Style, make_avatar, png
 from gltf_independent import Scene
 from sixpoint.body import rotations as rot
@@ -333,7 +333,6 @@ def test_what_exporters_get_wrong_is_put_right(tmp_path, boxing):
     np.testing.assert_allclose(shape.place(*places), again.place(*places), atol=CLOSE)
 
 
-@unmeasured
 @pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_characters_of_others_are_driven(path, data, tmp_path):
     """The paper's boxing clip moves them; their file gives the motion back."""

@@ -25,7 +25,9 @@ SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be 
 GUIDE = np.radians(40.0)  # the first trunk bone tells the pelvis' up only if it is this near to the posture's
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
 STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
-AHEAD = 0.35  # a foot that reaches less far forward [of its length] lies along the shank: steep ankles have 0.44
+AHEAD = (
+    0.35  # a foot that reaches less far forward [of its length] lies along the shank: steep ankles have 0.44
+)
 
 
 def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = None) -> Array:
@@ -201,7 +203,7 @@ def _turn(neutral: Array, below: Index, joint: int, axis: Array, bone: Array) ->
 
 
 def _keep_pitch(skeleton: Skeleton, neutral: Array, ankle: int, standing: Array) -> None:
-    """Keep the slope of a foot where knees were bent in the rest pose: what stands there is the sole, flat."""
+    """Keep the slope of a foot where knees are bent in the rest pose: it stands there on a flat sole."""
     change = rot.mul(neutral[ankle], rot.inv(standing))
     pitch = change * [1.0, 0.0, 0.0, 1.0]
     if np.linalg.norm(pitch) > 1e-6:

@@ -1,4 +1,4 @@
-"""Avatars that move as somebody else did: retargeted six points, posed on the avatar's own bones, soles on the floor."""
+"""Avatars that move as somebody else did: six points, retargeted and posed on the avatar's bones."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Actor:
         positions, world = self.motion.transforms
         vertices, normals = self.surface.place(positions[frame], world[frame])
         colours = self.surface.colours[:, :3].astype(np.float32)
-        return Body(vertices, normals, self.surface.triangles, colours, self.ghost)
+        return Body(vertices, normals, self.surface.triangles, colours, self.ghost, self.surface.painting)
 
 
 class Stage:

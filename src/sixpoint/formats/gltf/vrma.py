@@ -19,6 +19,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.human_bones import BonePoser
 from sixpoint.body.motion import Motion
+from sixpoint.body.soles import ankle_height
 from sixpoint.errors import FigureError, listed
 from sixpoint.formats.gltf.avatar import Avatar
 from sixpoint.formats.gltf.builder import Builder
@@ -133,7 +134,6 @@ def _lowered(name: str) -> str:
 
 
 def _hips_height(figure: Figure) -> float:
-    """Height of the pelvis joint over the lowest point of the standing figure [m]."""
-    rest, carriers = figure.rest_positions, figure.skeleton.site_parents
-    sites = rest[carriers] + rot.mul_vec(figure.neutral[carriers], figure.skeleton.site_offsets)
-    return float(rest[figure.roles.pelvis, 1] - min(rest[:, 1].min(), sites[:, 1].min(initial=np.inf)))
+    """Height of the pelvis joint over the soles of the standing figure [m]."""
+    rest, roles = figure.rest_positions, figure.roles
+    return float(rest[roles.pelvis, 1] - rest[list(roles.ankle), 1].mean()) + ankle_height(figure)
