@@ -3,8 +3,8 @@
     python benchmarks/avatar_pictures.py ../shared/data/mesh ../shared/data/paper/17_10.amc docs/avatars
 
 All avatars below the folder, or those named after it; beside them the recording on its own rig. Files that
-cannot be driven are listed with the reason; so are those that have bones only. The documentation shows CesiumMan,
-KayKit_Knight and cool_loops.
+cannot be driven are listed with the reason; so are those that have bones only. The documentation shows
+CesiumMan, KayKit_Knight and cool_loops.
 """
 
 from __future__ import annotations
