@@ -120,12 +120,12 @@ def _bones_of_map(motion: Motion, avatar: Avatar) -> _Bones:
 
 
 def _bones_of_figure(motion: Motion, figure: Figure) -> _Bones:
-    poser = BonePoser(figure, upper_chest=True)
+    poser = BonePoser(figure, upper_chest=True, chords=True)
     names = [_lowered(name) for name in poser.bones]
     parents = [names.index(_lowered(b.parent)) if b.parent else -1 for b in poser.bones.values()]
     offsets = poser.offsets.copy()
     offsets[0] = (0.0, _hips_height(figure), 0.0)
-    return _Bones(names, parents, offsets, poser.compute_rotations(motion), poser.compute_hips(motion))
+    return _Bones(names, parents, offsets, poser.follow_chords(motion), poser.compute_hips(motion))
 
 
 def _lowered(name: str) -> str:
