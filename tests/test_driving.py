@@ -7,7 +7,7 @@ import pytest
 
 import sixpoint as sp
 from body_rigs import family_skeleton
-from conftest import recordings, unmeasured
+from conftest import recordings
 from gltf_avatars import EXTENSIONS, PLACES, make_avatar
 from sixpoint.body import rotations as rot
 from sixpoint.body.surface.flesh import build_shape
@@ -172,23 +172,44 @@ def test_an_avatar_is_drawn_in_its_own_colours_and_size(folder, tmp_path):
     assert np.abs(first - third).mean() < 1.0
 
 
-def test_bones_without_a_mesh_cannot_be_drawn(folder, tmp_path, capsys):
-    """An avatar of bones only can be driven, and its picture is refused with the reason."""
+def test_bones_without_a_mesh_have_the_built_in_surface(folder, tmp_path):
+    """An avatar of bones only is driven and drawn, with the surface that any rig has."""
     pytest.importorskip("embreex", reason="pictures need the extra [render]")
-    words = ["render", str(folder / "boxing.bvh"), "--avatar", str(folder / "bones.vrm"), "-o"]
-    assert main([*words, str(tmp_path / "a.png")]) == 2
-    assert "bones only" in capsys.readouterr().err
+    image = pytest.importorskip("PIL.Image", reason="pictures need the extra [render]")
+    words = ["render", str(folder / "boxing.bvh"), "--avatar", str(folder / "bones.vrm")]
+    assert main([*words, "-o", str(tmp_path / "a.png"), "--size", "80x96", "--pictures", "1"]) == 0
+    picture = np.asarray(image.open(tmp_path / "a.png").convert("RGB")).astype(int)
+    assert (picture[..., 0] - picture[..., 2] > 60).sum() > 20  # the right side is orange
+
+
+def test_an_avatar_is_one_of_some_files(folder):
+    """Points are no avatar."""
     with pytest.raises(FormatError, match="an avatar is one of"):
         open_avatar(folder / "points.csv")
 
 
-@unmeasured
 @pytest.mark.parametrize("path", recordings("mesh/*.glb") + recordings("mesh/*.vrm"))
 def test_real_avatars_are_driven(path, folder, tmp_path):
-    """Every avatar of the data folder takes the boxing motion: most targets are met, skin stays finite."""
+    """Every avatar of the data folder takes the boxing motion: targets are met, skin stays finite."""
     done = reconstruct(folder / "boxing.bvh", tmp_path / "a.glb", reading=FEW, body=Body(avatar=path))
-    assert np.median(done.solved.solution.residual) < 0.01
+    assert np.mean(done.solved.solution.residual < 1e-3) > 0.95
     back = load(tmp_path / "a.glb")
     np.testing.assert_allclose(back.positions, done.solved.solution.motion.positions, atol=1e-4)
     if done.figure.shape is not None:
         assert np.isfinite(done.figure.shape.place(*(a[0] for a in back.transforms))).all()
+
+
+@pytest.mark.parametrize("path", recordings("mesh/*.glb") + recordings("mesh/*.vrm"))
+def test_real_avatars_box_as_recorded(path, data):
+    """The paper's boxing clip: elbows and knees are little more wrong than on the recording's own rig.
+
+    The knight's knees by up to 12 degrees: its hips are wide and over its pelvis, whose tilt moves them.
+    """
+    clip = load(data / "paper" / "17_10.amc").sliced(slice(0, 1200, 12))
+    owner, figure = sp.Figure.from_motion(clip), load_avatar(path).figure
+    solved = drive(figure, clip, owner)[1]
+    own = sp.SequentialIKPlus(owner).solve_motion(owner.targets(clip))
+    assert np.mean(solved.solution.residual < 1e-3) > 0.95
+    bent = [angles(*who) for who in ((owner, clip), (owner, own), (figure, solved.solution.motion))]
+    mistake, ours = (np.degrees(np.abs(b - bent[0]).mean(axis=0)) for b in bent[1:])
+    assert np.all(ours < mistake + [6.0, 6.0, 12.0, 12.0])

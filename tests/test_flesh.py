@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import sixpoint as sp
 from body_rigs import FAMILIES, family_skeleton, load, random_quaternions, reframed
-from conftest import recordings, unmeasured
+from conftest import recordings
 from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError
@@ -187,7 +187,6 @@ RIGS = sorted(
 ) or recordings("*/*.bvh")
 
 
-@unmeasured
 @pytest.mark.parametrize("path", RIGS)
 def test_rigs_of_recordings_have_a_surface(path):
     """One recording of every folder: skin lies around its bones."""

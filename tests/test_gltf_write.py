@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sixpoint as sp
-from conftest import recordings, unmeasured
+from conftest import recordings
 from gltf_avatars import BONES, EXTENSIONS, STYLES, Style, make_avatar, png
 from gltf_independent import Scene
 from sixpoint.body import rotations as rot
@@ -272,6 +272,37 @@ def test_a_vrm_animation_of_any_figure_keeps_limbs(tmp_path):
     assert t_pose[:, 1].min() == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize(("name", "worst"), [("boxing", 0.006), ("walk", 0.001), ("climb_and_hang", 0.008)])
+def test_a_vrm_animation_of_a_long_spine_keeps_shoulders_and_head(name, worst, tmp_path):
+    """Six trunk and neck joints on four bones: places within millimetres, chest and head turned exactly."""
+    figure = sp.Figure.from_stature()
+    motion = sp.make_sample(name, figure).sliced(slice(0, 300, 3))
+    check_trunk(figure, motion, tmp_path / "a.vrma", worst)
+
+
+@pytest.mark.parametrize("path", recordings("cmu/02_05.amc") + recordings("xsens/*.bvh"))
+def test_a_vrm_animation_of_a_recording_keeps_shoulders_and_head(path, tmp_path):
+    """The neck of CMU rigs has one joint more than the bone: within 5 mm."""
+    motion = load(path).sliced(slice(0, 600, 6))
+    check_trunk(sp.Figure.from_motion(motion), motion, tmp_path / "a.vrma", 0.005)
+
+
+def check_trunk(figure, motion, out, worst):
+    """A motion comes back from a .vrma: where shoulders and head are [m], how chest and head are turned."""
+    save(motion, out)
+    avatar = load_avatar(out)
+    acted = avatar.read_motion()
+    ours, theirs = figure.roles, avatar.figure.roles
+    for mine, other in ((ours.head, theirs.head), *zip(ours.shoulder, theirs.shoulder, strict=True)):
+        off = np.linalg.norm(acted.positions[:, other] - motion.positions[:, mine], axis=1)
+        assert off.max() < worst
+    chest = avatar.figure.skeleton.names.index("upperChest")
+    carrier = figure.skeleton.parents[ours.clavicle[0]]
+    for mine, other in ((ours.head, theirs.head), (carrier, chest)):
+        turned = rot.mul(motion.transforms[1][:, mine], rot.inv(figure.neutral[mine]))
+        assert rot.angle(rot.mul(rot.inv(turned), acted.transforms[1][:, other])).max() < 1e-5
+
+
 # --- what is refused -----------------------------------------------------------------------------
 
 
@@ -333,7 +364,6 @@ def test_what_exporters_get_wrong_is_put_right(tmp_path, boxing):
     np.testing.assert_allclose(shape.place(*places), again.place(*places), atol=CLOSE)
 
 
-@unmeasured
 @pytest.mark.parametrize("path", recordings("mesh/*.[gv]*"))
 def test_characters_of_others_are_driven(path, data, tmp_path):
     """The paper's boxing clip moves them; their file gives the motion back."""

@@ -11,7 +11,9 @@ import pytest
 import sixpoint as sp
 from body_rigs import family_skeleton
 from sixpoint.body import rotations as rot
+from sixpoint.body.surface.appearance import Texture, Texturing
 from sixpoint.body.surface.flesh import build_shape
+from sixpoint.body.surface.shape import Shape
 from sixpoint.cli import main
 from sixpoint.errors import SixpointError
 from sixpoint.jobs import render as job
@@ -19,6 +21,7 @@ from sixpoint.render.camera import FIELD, Camera
 from sixpoint.render.colours import paint
 from sixpoint.render.encoding import find_codec, lay_out
 from sixpoint.render.light import find_key, of_hex, spread_over_sphere, to_linear, to_srgb
+from sixpoint.render.painting import Painting
 from sixpoint.render.surface import Surface
 
 pytest.importorskip("embreex", reason="pictures need the extra [render]")
@@ -411,3 +414,54 @@ def test_missing_libraries_are_named_with_their_extra(file, tmp_path, monkeypatc
     message = capsys.readouterr().err
     assert "embreex, av (PyAV)" in message
     assert 'pip install "sixpoint[render]"' in message
+
+
+def stripes(size=64):
+    """A texture of black and white columns, one pixel each, and its smaller copies."""
+    level = np.full((size, size, 4), 255, np.uint8)
+    level[:, ::2, :3] = 0
+    levels = [level]
+    while len(levels[-1]) > 4:
+        level = levels[-1].astype(float)
+        half = (level[::2, ::2] + level[1::2, ::2] + level[::2, 1::2] + level[1::2, 1::2]) / 4
+        levels.append(np.round(half).astype(np.uint8))
+    return Texture(tuple(levels))
+
+
+def test_a_texture_is_sampled_between_its_pixels():
+    """In pixels' middles their own light; half-way the mean of neighbours; beyond the sides as asked."""
+    texture = stripes()
+    column = (np.arange(64) + 0.5) / 64
+    found = texture.sample(np.column_stack([column, np.full(64, 0.3)]))
+    np.testing.assert_allclose(found[:, 0], np.arange(64) % 2, atol=1e-12)
+    between = texture.sample(np.array([[2 / 64, 0.5]]))
+    np.testing.assert_allclose(between, [[0.5, 0.5, 0.5, 1.0]], atol=1e-12)
+    beyond = np.column_stack([[-0.5 / 64, -1.5 / 64, 1.0 + 0.5 / 64], [0.5] * 3])
+    for wrap, expected in (("repeat", [1, 0, 0]), ("clamp", [0, 0, 1]), ("mirror", [0, 1, 1])):
+        shown = Texture(texture.levels, (wrap, wrap)).sample(beyond)
+        np.testing.assert_allclose(shown[:, 0], expected, atol=1e-12, err_msg=wrap)
+
+
+@pytest.mark.parametrize(("far", "contrast"), [(1e-4, 0.9), (10.0, 0.05)])
+def test_textures_are_as_fine_as_the_picture(far, contrast):
+    """Near, stripes are stripes; where a step of the picture covers many, they are an even grey."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    places = corners[:, :2]
+    shape = Shape(
+        corners,
+        [[0, 1, 2], [0, 2, 3]],
+        np.zeros((4, 1), int),
+        np.ones((4, 1)),
+        np.zeros((1, 3)),
+        [[0, 0, 0, 1]],
+    )
+    texturing = Texturing((stripes(),), np.array([0, -1]), places, np.ones((4, 4)))
+    painting = Painting(texturing, shape, np.arange(2))
+    shares = np.random.default_rng(0).dirichlet(np.ones(3), 500).astype(np.float32)
+    colours = np.full((500, 3), 7.0, np.float32)
+    corner = np.tile(shape.triangles[0], (500, 1))
+    painting.apply(colours, np.zeros(500, int), corner, shares, np.full(500, far))
+    assert (np.ptp(colours) > contrast) == (far < 1.0)
+    plain = np.full((500, 3), 7.0, np.float32)
+    painting.apply(plain, np.ones(500, int), corner, shares, np.full(500, far))
+    assert np.all(plain == 7.0)

@@ -14,7 +14,8 @@ from body_rigs import exercise, family_skeleton, load, real_rigs
 from conftest import recordings
 from sixpoint.body import rotations as rot
 from sixpoint.body.reach import find_lift
-from sixpoint.body.retargeting import ankle_height, carry_points, carry_trunk
+from sixpoint.body.retargeting import carry_points, carry_trunk
+from sixpoint.body.soles import ankle_height
 from sixpoint.body.stature import stature_of
 from sixpoint.calibration.person import estimate_figure
 from sixpoint.errors import FigureError, TargetError

@@ -9,7 +9,8 @@ anatomical frame and D = inv(that quarter turn) for the bones of the arm, else t
 
 Avatars have fewer vertebrae than figures: the joints from the pelvis to where the arms hang are shared out
 evenly among Spine and Chest (and UpperChest); each bone takes the world rotation of its last joint. So hips,
-chest, head, arms and legs point exactly where the figure's do.
+chest, head, arms and legs point exactly where the figure's do. What a bent spine of more joints shifts them
+by can mostly be taken back (``BonePoser.follow_chords``).
 
 Reference: VRM specification, "T-pose"; UnityEngine.HumanBodyBones.
 """
@@ -44,6 +45,10 @@ HUMAN_BONES = (
 )
 """The 55 names of Unity's HumanBodyBones, in its order."""
 
+_NEXT = {"Spine": ("Chest",), "Chest": ("UpperChest",), "Neck": ("Head",)}
+"""What a bone may have to point to."""
+TINY = 1e-6  # m, a chord without direction
+
 _SIDES = ("Left", "Right")
 _QUARTER = (  # D of the left and of the right arm
     rot.from_axis_angle([0.0, 0.0, 1.0], -math.pi / 2),
@@ -73,13 +78,14 @@ class Bone:
         return rot.IDENTITY if self.arm is None else _QUARTER[self.arm]
 
 
-def find_bones(figure: Figure, upper_chest: bool = False) -> dict[str, Bone]:
+def find_bones(figure: Figure, upper_chest: bool = False, chords: bool = False) -> dict[str, Bone]:
     """Unity's name -> bone, for all bones that a figure has, parents first.
 
     Args:
         figure: The figure.
         upper_chest: Share the trunk out among three bones instead of two. An avatar that lacks UpperChest
             loses what it turns, so only for avatars that are known to have it.
+        chords: The last trunk bone is the last trunk joint alone, for ``BonePoser.follow_chords``.
     """
     roles, skeleton = figure.roles, figure.skeleton
     bones = {"Hips": Bone("", roles.pelvis, roles.pelvis)}
@@ -87,7 +93,9 @@ def find_bones(figure: Figure, upper_chest: bool = False) -> dict[str, Bone]:
     carriers &= set(skeleton.path(roles.pelvis, roles.shoulder[1]))
     trunk = [j for j in roles.spine if j in carriers]
     names = ("Spine", "Chest", "UpperChest")[: min(len(trunk), 3 if upper_chest else 2)]
-    cuts = [math.ceil(k * len(trunk) / max(len(names), 1)) for k in range(len(names) + 1)]
+    alone = int(chords and len(trunk) > len(names) > 1)
+    shared, among = len(trunk) - alone, max(len(names) - alone, 1)
+    cuts = [math.ceil(k * shared / among) for k in range(among + 1)] + [len(trunk)] * alone
     last = "Hips"
     for k, name in enumerate(names):
         bones[name] = Bone(last, trunk[cuts[k]], trunk[cuts[k + 1] - 1])
@@ -126,9 +134,9 @@ class BonePoser:
         offsets: (B, 3) each bone's place in its parent bone in the T-pose [m], sixpoint's axes; hips: 0.
     """
 
-    def __init__(self, figure: Figure, upper_chest: bool = False) -> None:
+    def __init__(self, figure: Figure, upper_chest: bool = False, chords: bool = False) -> None:
         self.figure = figure
-        self.bones = find_bones(figure, upper_chest)
+        self.bones = find_bones(figure, upper_chest, chords)
         joints = len(figure.skeleton)
         paths, before, after = [], [], []
         offsets = np.zeros((len(self.bones), 3))
@@ -161,6 +169,27 @@ class BonePoser:
         for joints in self._paths.T:
             turned = rot.mul(turned, local[..., joints, :])
         return rot.mul(turned, self._after)
+
+    def follow_chords(self, motion: Motion) -> Array:
+        """(F, B, 4) rotations as above, but bones of several joints point to where the next bone begins.
+
+        Then shoulders and head are where the figure's are but for what a bent spine is shorter than a
+        straight one; such a bone turns as its chord, no longer as the last of its joints.
+        """
+        names, local = list(self.bones), self.compute_rotations(motion)
+        turned: dict[str, Array] = {"": np.broadcast_to(rot.IDENTITY, (len(motion), 4))}
+        bent = dict(turned)
+        out = np.empty_like(local)
+        for k, (name, bone) in enumerate(self.bones.items()):
+            turned[name] = bent[name] = rot.mul(turned[bone.parent], local[:, k])
+            following = next((n for n in _NEXT.get(name, ()) if n in self.bones), None)
+            if following is not None and bone.origin != bone.joint:
+                straight = rot.mul_vec(turned[name], rot.unit(self.offsets[names.index(following)]))
+                chord = motion.positions[:, self.bones[following].origin] - motion.positions[:, bone.origin]
+                if straight.any() and np.linalg.norm(chord, axis=1).min() > TINY:
+                    bent[name] = rot.mul(rot.between(straight, rot.unit(chord)), turned[name])
+            out[:, k] = rot.mul(rot.inv(bent[bone.parent]), bent[name])
+        return out
 
     def compute_hips(self, pose: Pose | Motion) -> Array:
         """(3,) world position of the pelvis joint [m]; of a motion (F, 3)."""

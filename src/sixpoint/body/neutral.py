@@ -25,6 +25,9 @@ SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be 
 GUIDE = np.radians(40.0)  # the first trunk bone tells the pelvis' up only if it is this near to the posture's
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
 STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
+AHEAD = (
+    0.35  # a foot that reaches less far forward [of its length] lies along the shank: steep ankles have 0.44
+)
 
 
 def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = None) -> Array:
@@ -56,9 +59,12 @@ def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = No
         )
     neutral = np.array(neutral)
     neutral[np.setdiff1d(np.arange(len(skeleton)), below_pelvis)] = rot.IDENTITY  # what is above stands still
+    standing = neutral.copy()
     for limb, chain in enumerate(roles.limbs):
         _set_limb(skeleton, neutral, chain, limb >= 2, motion, frames)
     for ankle in roles.ankle:
+        if world_axes is not None:
+            _keep_pitch(skeleton, neutral, ankle, standing[ankle])
         _level_foot(skeleton, neutral, ankle, local)
     return rot.normalised(neutral)
 
@@ -196,13 +202,23 @@ def _turn(neutral: Array, below: Index, joint: int, axis: Array, bone: Array) ->
     neutral[below] = rot.mul(change, neutral[below])
 
 
+def _keep_pitch(skeleton: Skeleton, neutral: Array, ankle: int, standing: Array) -> None:
+    """Keep the slope of a foot where knees are bent in the rest pose: it stands there on a flat sole."""
+    change = rot.mul(neutral[ankle], rot.inv(standing))
+    pitch = change * [1.0, 0.0, 0.0, 1.0]
+    if np.linalg.norm(pitch) > 1e-6:
+        below = skeleton.subtree(ankle)
+        level = rot.mul(change, rot.inv(rot.normalised(pitch)))
+        neutral[below] = rot.mul(rot.mul(level, rot.inv(change)), neutral[below])
+
+
 def _level_foot(skeleton: Skeleton, neutral: Array, ankle: int, local: Array) -> None:
     """Point a foot forward where the rest pose does not: rigs whose rest has the foot along the shank."""
     bone = foot_direction(skeleton, ankle, local)
     if bone is None:
         return
     foot = rot.mul_vec(neutral[ankle], bone)
-    if foot @ Z > 0.5:
+    if foot @ Z > AHEAD:
         return
     level = rot.unit(Z - 0.4 * Y)  # about the slope from ankle to toes
     below = skeleton.subtree(ankle)

@@ -20,7 +20,6 @@ et al. 2001, "Computer puppetry: an importance-based approach", ACM Transactions
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -30,6 +29,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.reach import Ends, find_lift
+from sixpoint.body.soles import ankle_height
 from sixpoint.body.spine_chain import HEAD
 from sixpoint.body.targets import Targets
 from sixpoint.errors import FigureError, TargetError, listed
@@ -39,7 +39,6 @@ Mode = Literal["relative", "absolute"]
 
 MODES: tuple[Mode, ...] = get_args(Mode)
 WHOLE = 0.985  # share of a limb that counts as its reach: a solver puts hips only nearly where they are here
-FLAT = 0.04  # a foot that reaches less far below the ankle [of the pelvis' height over it] shows no sole
 
 
 def carry_points(
@@ -156,30 +155,6 @@ def _pose(figure: Figure, wished: dict[int, Array], rate: float) -> Motion:
 
 
 # --- proportions ---------------------------------------------------------------------------------
-
-
-def ankle_height(figure: Figure) -> float:
-    """Height of the ankles over the soles, standing [m]: as the rig has it, else by proportion.
-
-    Soles are where the lowest joint or site of a foot is in the neutral pose.
-    """
-    skeleton, ankles, rest = figure.skeleton, figure.roles.ankle, figure.rest_positions
-    marks = skeleton.compute_sites(rest, figure.neutral)[:, 1]
-    height = float(rest[figure.roles.pelvis, 1] - rest[list(ankles), 1].mean())
-    drop = 0.0
-    for ankle in ankles:
-        foot = skeleton.subtree(ankle)
-        below = [*rest[foot, 1], *marks[np.isin(skeleton.site_parents, foot)]]
-        drop = max(drop, float(rest[ankle, 1] - min(below)))
-    return drop if drop > FLAT * height else _average_ankle() * height
-
-
-@cache
-def _average_ankle() -> float:
-    """Height of the ankles over the soles, of the pelvis' height over the ankles."""
-    figure = Figure.from_stature()
-    rest = figure.rest_positions
-    return ankle_height(figure) / float(rest[figure.roles.pelvis, 1] - rest[figure.roles.ankle[0], 1])
 
 
 def _trunk_length(figure: Figure) -> float:

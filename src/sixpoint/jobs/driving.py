@@ -1,4 +1,4 @@
-"""Avatars that move as somebody else did: retargeted six points, posed on the avatar's own bones."""
+"""Avatars that move as somebody else did: six points, retargeted and posed on the avatar's bones."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.limits import Limits
 from sixpoint.body.motion import Motion
 from sixpoint.body.retargeting import Mode, carry_points, carry_pose
+from sixpoint.body.soles import ankle_height, find_floor
 from sixpoint.body.spine_chain import SpineChain
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import FormatError, SixpointError, listed
@@ -19,9 +20,12 @@ from sixpoint.formats.suffixes import with_path
 from sixpoint.jobs.progress import Progress, silent
 from sixpoint.jobs.retarget import find_posture
 from sixpoint.jobs.solving import Solved, Solving, solve
+from sixpoint.live.feet import Floor, level_feet
 
 SAME = 1e-3
 """Part of a body's height within which bones are the same."""
+NEAR = 0.1
+"""Part of a body's height within which soles that stand are on the floor at zero."""
 AVATAR_OUTPUTS = (".glb", ".vrma", ".bvh")
 AVATARS = tuple(suffix for suffix in GLTF_SUFFIXES if suffix != ".vrma")
 
@@ -67,7 +71,7 @@ def drive(
     solving: Solving | None = None,
     progress: Progress = silent,
 ) -> tuple[Targets, Solved]:
-    """Pose a figure as another body was.
+    """Pose a figure as another body was, on its soles: flat where nothing turns a foot, toes above the floor.
 
     The six points lead. A method that can do so starts from the posture as it was, and turns pelvis, head,
     hands and feet as a motion has them; with ``solving.rotations`` only those that are named there.
@@ -91,4 +95,17 @@ def drive(
     solving = solving or Solving()
     if isinstance(recording, Motion) and not solving.rotations and solving.takes("rotations"):
         solving = replace(solving, rotations=EFFECTORS)
-    return targets, solve(figure, targets, solving, progress, start=pose)
+    solved = solve(figure, targets, solving, progress, start=pose)
+    measured = () if targets.rotations is None else solving.rotations
+    level = _level(figure, solved.solution.motion, ("l_ankle" not in measured, "r_ankle" not in measured))
+    return targets, replace(solved, solution=replace(solved.solution, motion=level))
+
+
+def _level(figure: Figure, motion: Motion, free: tuple[bool, bool]) -> Motion:
+    """A motion whose feet are on the floor, not in it, if it is a motion on a floor."""
+    height = find_floor(figure, motion)
+    if abs(height) > NEAR * figure.height:
+        return motion
+    floor = replace(Floor.under(figure, height), ankle=ankle_height(figure))
+    poses = (level_feet(figure, motion.pose(k), floor, free=free, clear=True) for k in range(len(motion)))
+    return replace(motion, rotations=np.array([pose.rotations for pose in poses]))

@@ -193,8 +193,6 @@ def _open_actor(
     if avatar is not None:
         looks = open_avatar(avatar)
         figure = looks.figure
-        if figure.shape is None:
-            raise FormatError(avatar, "this avatar has bones only, and no mesh that could be drawn")
         if not is_on(motion, figure):
             owner = opened.find_figure(mapping)
             motion = drive(figure, motion, owner, progress=progress)[1].solution.motion
@@ -205,8 +203,9 @@ def _open_actor(
         figure = opened.find_figure(mapping)
     shape = figure.shape or build_shape(figure)
     own = looks.appearance if looks is not None and figure.shape is not None else None
-    painted = own.colours if own is not None and colours is None else paint(figure, shape, colours or "sides")
-    return Actor(figure, motion, Surface(shape, painted))
+    if own is not None and colours is None:
+        return Actor(figure, motion, Surface(shape, own.colours, own.texturing))
+    return Actor(figure, motion, Surface(shape, paint(figure, shape, colours or "sides")))
 
 
 def _choose_frames(motion: Motion, look: Look, sheet: bool) -> NDArray[np.int64]:

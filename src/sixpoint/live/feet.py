@@ -13,6 +13,7 @@ from math import acos, asin, cos, sin
 
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Pose
+from sixpoint.body.soles import measure_feet
 from sixpoint.body.stature import stature_of
 from sixpoint.calibration.model import ANKLE_HEIGHT
 from sixpoint.kernels import quaternion as qt
@@ -34,22 +35,31 @@ class Floor:
     Attributes:
         stature: Of the figure [m].
         ankle: Height of its ankles over the floor in standing [m].
+        toes: How far the tips of its toes are before the ankle [m].
         height: Of the floor [m].
     """
 
     stature: float
     ankle: float
+    toes: float
     height: float = 0.0
 
     @classmethod
     def under(cls, figure: Figure, height: float = 0.0) -> Floor:
-        """The floor under a figure of average proportions, whose ankles are 0.039 of the stature over it."""
+        """The floor under a figure: its feet are those of its skin, else of average proportions."""
         stature = stature_of(figure)
-        return cls(stature, ANKLE_HEIGHT * stature, height)
+        skin = measure_feet(figure)
+        ankle, toes = (ANKLE_HEIGHT * stature, TOES * stature) if skin is None else skin
+        return cls(stature, ankle, toes, height)
 
 
 def level_feet(
-    figure: Figure, pose: Pose, floor: Floor | None = None, *, free: tuple[bool, bool] = (True, True)
+    figure: Figure,
+    pose: Pose,
+    floor: Floor | None = None,
+    *,
+    free: tuple[bool, bool] = (True, True),
+    clear: bool = False,
 ) -> Pose:
     """Turn the ankles of a solved pose so that low feet are flat on the floor.
 
@@ -58,6 +68,7 @@ def level_feet(
         pose: A pose of it.
         floor: Where the floor is; ``Floor.under(figure)`` by default, which a loop makes once.
         free: Whether the left, the right foot has no measured rotation; others are left alone.
+        clear: Turn up the toes of these, too, where they are in the floor.
 
     Returns:
         A pose that differs in the ankles' rotations only.
@@ -66,29 +77,33 @@ def level_feet(
     roles, rotations = figure.roles, pose.rotations.copy()
     places, world = trace(pose, roles.ankle)
     for knee, ankle, is_free in zip(roles.knee, roles.ankle, free, strict=True):
-        if not is_free:
+        if not (is_free or clear):
             continue
         neutral = tuple(figure.neutral[ankle].tolist())
         bone = vec.unit(vec.sub(places[knee], places[ankle]))
         lean = acos(min(max(bone[1], -1.0), 1.0))
         now = qt.mul(world[ankle], qt.inv(neutral))
-        turn = _level(now, places[ankle][1] - floor.height - floor.ankle, lean, floor)
+        height = places[ankle][1] - floor.height - floor.ankle
+        upright = 1.0 - float(ease((lean - STEEP) / (LYING - STEEP)))
+        turn = _clear(_level(now, height, upright, floor) if is_free else now, height, upright, floor)
         above = world[int(figure.skeleton.parents[ankle])]
         rotations[ankle] = qt.inv_mul(above, qt.mul(turn, neutral))
     return Pose(pose.skeleton, rotations, pose.translations, pose.moving)
 
 
-def _level(now: Quaternion, height: float, lean: float, floor: Floor) -> Quaternion:
-    """World rotation of a foot whose ankle is ``height`` over where it stands [m]."""
+def _level(now: Quaternion, height: float, upright: float, floor: Floor) -> Quaternion:
+    """World rotation of a foot whose ankle is ``height`` over where it stands [m]: flat where that is low."""
     yaw = compute_yaw(now)
     flat = (0.0, sin(0.5 * yaw), 0.0, cos(0.5 * yaw))
     weight = 1.0 - float(ease((height / floor.stature - LOW) / (HIGH - LOW)))
-    upright = 1.0 - float(ease((lean - STEEP) / (LYING - STEEP)))
     change = qt.mul(flat, qt.inv(now))
     size = vec.norm(qt.log(change))
-    turn = qt.mul(qt.scaled(change, min(weight * upright, FLEX / max(size, 1e-9))), now)
-    # The tips of the toes are at least on the floor: a foot that points lower is turned up.
-    toes = qt.mul_vec(turn, (0.0, -floor.ankle, TOES * floor.stature))
+    return qt.mul(qt.scaled(change, min(weight * upright, FLEX / max(size, 1e-9))), now)  # type: ignore[no-any-return]
+
+
+def _clear(turn: Quaternion, height: float, upright: float, floor: Floor) -> Quaternion:
+    """The tips of the toes are at least on the floor: a foot that points lower is turned up."""
+    toes = qt.mul_vec(turn, (0.0, -floor.ankle, floor.toes))
     least = -(height + floor.ankle)
     if toes[1] < least and upright > 0.0:
         reach = vec.norm(toes)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.render.camera import Camera
+from sixpoint.render.camera import FIELD, Camera
 from sixpoint.render.floor import Ground
 from sixpoint.render.light import KEY, find_key, spread_over_disc, to_srgb
+from sixpoint.render.painting import Painting
 from sixpoint.render.sky import find_sky_light
 from sixpoint.render.tracing import Hits, Tracer
 
@@ -39,6 +40,7 @@ class Body:
         triangles: (T, 3).
         colours: (V, 3) linear.
         ghost: Drawn translucent, behind the others, and without a shadow.
+        painting: Colours between the vertices, if there are textures.
     """
 
     vertices: Floats
@@ -46,6 +48,7 @@ class Body:
     triangles: Index
     colours: Floats
     ghost: bool = False
+    painting: Painting | None = None
 
 
 def take_picture(bodies: list[Body], camera: Camera, ground: Ground) -> NDArray[np.uint8]:
@@ -80,6 +83,7 @@ class _Shading:
         self.tracer = Tracer(body.vertices, body.triangles)
         self.sky = find_sky_light(self.tracer, body.vertices, body.normals, body.triangles)
         self.eye = camera.eye.astype(np.float32)
+        self.step = 2.0 * np.tan(FIELD / 2) / camera.size[1] / np.sqrt(len(SAMPLES))  # per metre away
 
     def run(self) -> tuple[Floats, Floats]:
         """Light (height, width, 3), already times the cover, and the cover (height, width)."""
@@ -130,6 +134,9 @@ class _Shading:
         flat[behind] *= -1.0
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
         colours = np.einsum("nkc,nk->nc", body.colours[corners], hits.shares)
+        if body.painting is not None:
+            step = hits.distances * self.step
+            body.painting.apply(colours, hits.triangles, corners, hits.shares, step)
         starts = _smooth_starts(points, normals, flat, body, corners, hits.shares, behind)
         around = colours * np.einsum("nkc,nk->nc", self.sky[corners], hits.shares)
         lean = (normals @ self.key.astype(np.float32)).clip(0.0)

@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
+from sixpoint.body.soles import find_floor
 from sixpoint.errors import SixpointError, listed
 from sixpoint.render.camera import Camera
 from sixpoint.render.floor import Ground
@@ -27,7 +28,6 @@ VIEWS = {"front": (0.0, 6.0), "three-quarter": (38.0, 8.0), "side": (90.0, 6.0),
 LOOKS = 48  # frames that say what must be in view
 TRAVEL = 1.1  # of the body's height: what goes farther is followed
 SMOOTH = 0.7  # of the followed path [s]
-STANDING = 0.2  # of the frames at least one foot stands in
 NEAR = (-0.6, 0.12)  # where a floor is believed to be [m]
 
 
@@ -59,7 +59,7 @@ class Actor:
         positions, world = self.motion.transforms
         vertices, normals = self.surface.place(positions[frame], world[frame])
         colours = self.surface.colours[:, :3].astype(np.float32)
-        return Body(vertices, normals, self.surface.triangles, colours, self.ghost)
+        return Body(vertices, normals, self.surface.triangles, colours, self.ghost, self.surface.painting)
 
 
 class Stage:
@@ -110,11 +110,7 @@ class Stage:
         Toes that bend into the floor do not lower it: six points do not tell how feet roll.
         """
         lead = self.actors[0]
-        ankles = list(lead.figure.roles.ankle)
-        positions, world = lead.figure.neutral_pose.compute_transforms()
-        sole = positions[ankles, 1].min() - lead.surface.shape.place(positions, world)[:, 1].min()
-        lowest = lead.motion.positions[:, ankles, 1].min(axis=1) - sole
-        low = float(np.quantile(lowest, STANDING))
+        low = find_floor(lead.figure.with_shape(lead.surface.shape), lead.motion)
         return low if NEAR[0] < low < NEAR[1] else min(low, 0.0)
 
     @cached_property

@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.surface.appearance import Texturing
 from sixpoint.body.surface.shape import Shape
+from sixpoint.render.painting import Painting
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -25,16 +27,27 @@ class Surface:
     Attributes:
         shape: The skinned mesh.
         colours: (V, 4) linear RGB and opacity, each 0..1.
+        texturing: What is between the vertices, if anything.
     """
 
     shape: Shape
     colours: Array
+    texturing: Texturing | None = None
+
+    @cached_property
+    def _shown(self) -> Index:
+        """(T,) which triangles are seen."""
+        return np.flatnonzero((self.colours[:, 3] >= OPAQUE)[self.shape.triangles].any(axis=1))
 
     @cached_property
     def triangles(self) -> Index:
         """(T, 3) those that are seen."""
-        opaque = (self.colours[:, 3] >= OPAQUE)[self.shape.triangles].any(axis=1)
-        return np.asarray(self.shape.triangles[opaque])
+        return np.asarray(self.shape.triangles[self._shown])
+
+    @cached_property
+    def painting(self) -> Painting | None:
+        """The textures of the triangles that are seen."""
+        return None if self.texturing is None else Painting(self.texturing, self.shape, self._shown)
 
     @cached_property
     def _welded(self) -> Index:

@@ -1,4 +1,4 @@
-"""How a shape looks: one colour per vertex, which is enough for pictures."""
+"""How a shape looks: a colour per vertex, and textures for pictures that show more than vertices can."""
 
 from __future__ import annotations
 
@@ -11,17 +11,66 @@ from sixpoint.body.skeleton import frozen
 from sixpoint.errors import FigureError
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+_CODES = np.arange(256) / 255.0
+LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
+"""Light of the 256 codes of sRGB."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Texture:
+    """An image that is wrapped around a surface.
+
+    Attributes:
+        levels: The image (H, W, 4), sRGB and opacity, and smaller copies of it, each half as wide and tall.
+        wrap: What is beyond its sides, across and down: "repeat", "clamp" or "mirror".
+    """
+
+    levels: tuple[Bytes, ...]
+    wrap: tuple[str, str] = ("repeat", "repeat")
+
+    def sample(self, places: Array, level: int = 0) -> Array:
+        """Bilinear samples (n, 4), linear, at places (n, 2), which are 0 to 1 across and down."""
+        image = self.levels[min(level, len(self.levels) - 1)]
+        columns, right = _cells(places[:, 0], image.shape[1], self.wrap[0])
+        rows, down = _cells(places[:, 1], image.shape[0], self.wrap[1])
+        upper, lower = (
+            _light(image[row, columns[0]]) * (1 - right) + _light(image[row, columns[1]]) * right
+            for row in rows
+        )
+        return np.asarray(upper * (1 - down) + lower * down)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Texturing:
+    """Which texture is where on a shape.
+
+    Attributes:
+        textures: The images.
+        chosen: (T,) texture of each triangle; -1 for none.
+        places: (V, 2) where each vertex is on it.
+        tints: (V, 4) what its colour is multiplied with, linear.
+    """
+
+    textures: tuple[Texture, ...]
+    chosen: Index
+    places: Array
+    tints: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Appearance:
-    """Colours of the vertices of a ``Shape``.
+    """Colours of a ``Shape``.
 
     Attributes:
-        colours: (V, 4) red, green, blue and opacity, 0 to 1, linear (not sRGB).
+        colours: (V, 4) red, green, blue and opacity of the vertices, 0 to 1, linear (not sRGB).
+        texturing: What is between them, where the shape has textures.
     """
 
     colours: Array
+    texturing: Texturing | None = None
 
     def __repr__(self) -> str:
         return f"Appearance({len(self.colours)} vertices)"
@@ -32,3 +81,24 @@ class Appearance:
             raise FigureError(f"colours must be (V, 4), got {self.colours.shape}")
         if not (np.all(self.colours >= 0) and np.all(self.colours <= 1)):
             raise FigureError("colours must be from 0 to 1")
+
+
+def _light(codes: Bytes) -> Array:
+    """Pixels (n, 4) of an image as light and opacity."""
+    return np.concatenate([LINEAR[codes[:, :3]], _CODES[codes[:, 3:]]], axis=1)
+
+
+def _cells(places: Array, size: int, wrap: str) -> tuple[list[Index], Array]:
+    """The two cells (n,) of a row of pixels around each place (n,), and the share (n, 1) of the second."""
+    at = np.clip(places, -1e6, 1e6) * size - 0.5
+    low = np.floor(at).astype(np.int64)
+    cells = []
+    for cell in (low, low + 1):
+        if wrap == "clamp":
+            cells.append(np.clip(cell, 0, size - 1))
+        elif wrap == "mirror":
+            folded = cell % (2 * size)
+            cells.append(np.where(folded < size, folded, 2 * size - 1 - folded))
+        else:
+            cells.append(cell % size)
+    return cells, (at - low)[:, None]

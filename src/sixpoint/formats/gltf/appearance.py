@@ -1,8 +1,7 @@
-"""Materials and textures baked to one colour per vertex.
+"""Materials and textures: one colour per vertex, and what is between vertices.
 
-Base colour factor times base colour texture (bilinear, at the vertex) times vertex colour; what needs light
-or a view (metal, normal maps, toon shading) is left out. An image that cannot be decoded is said and counts
-as white.
+Base colour factor times base colour texture times vertex colour; what needs light or a view (metal, normal
+maps, toon shading) is left out. An image that cannot be decoded is said and counts as white.
 
 Reference: Khronos, glTF 2.0 specification, section 3.9 (materials), 3.8 (textures); KHR_texture_transform.
 """
@@ -17,44 +16,69 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.surface.appearance import Appearance
+from sixpoint.body.surface.appearance import Appearance, Bytes, Texture, Texturing
 from sixpoint.formats.gltf.accessors import read_floats
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.mesh import Piece
 
 Array = NDArray[np.float64]
 
-REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
+REPEAT = 10497
+WRAPS = {REPEAT: "repeat", 33071: "clamp", 33648: "mirror"}
 MOST_PIXELS = 64_000_000
+SMALLEST = 16  # pixels: smaller copies of an image show nothing
 
 
-def bake_appearance(document: Document, pieces: list[Piece]) -> Appearance:
-    """Colours of the vertices of all pieces, in their order."""
-    textures: dict[int, Array | None] = {}
-    return Appearance(np.concatenate([_bake(document, piece, textures) for piece in pieces]))
+def read_appearance(document: Document, pieces: list[Piece]) -> Appearance:
+    """Colours and textures of all pieces, in their order."""
+    textures: dict[int, Texture | None] = {}
+    used: list[Texture] = []
+    colours, chosen, places, tints = [], [], [], []
+    for piece in pieces:
+        tint, reference = _read_tint(document, piece)
+        texture = None if reference is None else _texture(document, reference["index"], textures)
+        place = None if reference is None or texture is None else _read_uv(document, piece, reference)
+        number, colour = -1, tint
+        if texture is not None and place is not None:
+            if texture not in used:
+                used.append(texture)
+            number, colour = used.index(texture), tint * texture.sample(place)
+        if _is_opaque(document, piece):
+            colour[:, 3] = 1.0
+        colours.append(np.clip(colour, 0.0, 1.0))
+        chosen.append(np.full(len(piece.triangles), number))
+        places.append(np.zeros((len(tint), 2)) if place is None else place)
+        tints.append(tint)
+    texturing = None
+    if used:
+        joined = (np.concatenate(parts) for parts in (chosen, places, tints))
+        texturing = Texturing(tuple(used), *joined)
+    return Appearance(np.concatenate(colours), texturing)
 
 
-def _bake(document: Document, piece: Piece, textures: dict[int, Array | None]) -> Array:
+def _read_tint(document: Document, piece: Piece) -> tuple[Array, dict[str, Any] | None]:
+    """Factor times vertex colour (n, 4) of a piece, and how its material names a texture."""
     attributes = piece.primitive["attributes"]
-    colours = np.ones((len(piece.used), 4))
+    tint, reference = np.ones((len(piece.used), 4)), None
     if "material" in piece.primitive:
-        material = document.items("materials")[piece.primitive["material"]]
-        surface = material.get("pbrMetallicRoughness", {})
-        colours *= surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        surface = document.items("materials")[piece.primitive["material"]].get("pbrMetallicRoughness", {})
+        tint *= surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
         reference = surface.get("baseColorTexture")
-        image = None if reference is None else _texture(document, reference["index"], textures)
-        if reference is not None and image is not None:
-            uv = _read_uv(document, piece, reference)
-            if uv is not None:
-                sampler = document.items("textures")[reference["index"]].get("sampler")
-                wrap = {} if sampler is None else document.items("samplers")[sampler]
-                colours *= _sample(image, uv, wrap)
     if "COLOR_0" in attributes:
         kind = document.items("accessors")[attributes["COLOR_0"]]["type"]
         shade = read_floats(document, attributes["COLOR_0"], kind, f"COLOR_0 of {piece.label}")
         if len(shade) > piece.used.max() and shade.shape[1] in (3, 4):
-            colours[:, : shade.shape[1]] *= shade[piece.used]
-    return np.clip(colours, 0.0, 1.0)
+            tint[:, : shade.shape[1]] *= shade[piece.used]
+    return tint, reference
+
+
+def _is_opaque(document: Document, piece: Piece) -> bool:
+    """Whether opacity is to be ignored, which it is unless a material says otherwise."""
+    if "material" not in piece.primitive:
+        return True
+    return bool(
+        document.items("materials")[piece.primitive["material"]].get("alphaMode", "OPAQUE") == "OPAQUE"
+    )
 
 
 def _read_uv(document: Document, piece: Piece, reference: dict[str, Any]) -> Array | None:
@@ -78,8 +102,8 @@ def _read_uv(document: Document, piece: Piece, reference: dict[str, Any]) -> Arr
     return np.asarray((uv * scale) @ np.array([[c, -s], [s, c]]) + offset)
 
 
-def _texture(document: Document, index: int, textures: dict[int, Array | None]) -> Array | None:
-    """(H, W, 4) of a texture, linear; None where its image cannot be had."""
+def _texture(document: Document, index: int, textures: dict[int, Texture | None]) -> Texture | None:
+    """A texture; None where its image cannot be had."""
     if index not in textures:
         texture = document.items("textures")[index]
         webp = texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source")
@@ -87,7 +111,14 @@ def _texture(document: Document, index: int, textures: dict[int, Array | None]) 
         textures[index] = None
         if isinstance(source, int) and 0 <= source < len(document.items("images")):
             try:
-                textures[index] = _decode(read_image(document, source)[0])
+                levels = _decode(read_image(document, source)[0])
+                sampler = texture.get("sampler")
+                keys = {} if sampler is None else document.items("samplers")[sampler]
+                wrap = (
+                    WRAPS.get(keys.get("wrapS", REPEAT), "repeat"),
+                    WRAPS.get(keys.get("wrapT", REPEAT), "repeat"),
+                )
+                textures[index] = Texture(levels, wrap)
             except Exception as error:  # Pillow raises many kinds on damaged images
                 label = document.label("images", source)
                 warnings.warn(f"{document.path}: {label} cannot be decoded: {error}", stacklevel=6)
@@ -119,38 +150,13 @@ def read_image(document: Document, index: int) -> tuple[bytes, str]:
     return data, str(image.get("mimeType", "image/png"))
 
 
-def _decode(data: bytes) -> Array:
+def _decode(data: bytes) -> tuple[Bytes, ...]:
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as picture:
         if picture.width * picture.height > MOST_PIXELS:
             raise ValueError(f"{picture.width} x {picture.height} pixels are too many")
-        pixels = np.asarray(picture.convert("RGBA"), np.float64) / 255.0
-    rgb = pixels[..., :3]
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return np.concatenate([linear, pixels[..., 3:]], axis=2)
-
-
-def _sample(image: Array, uv: Array, wrap: dict[str, Any]) -> Array:
-    """Bilinear samples (n, 4) of an image at texture coordinates (n, 2)."""
-    height, width = image.shape[:2]
-    corners = []
-    for axis, (size, key) in enumerate(((width, "wrapS"), (height, "wrapT"))):
-        place = np.clip(uv[:, axis], -1e6, 1e6) * size - 0.5
-        low = np.floor(place).astype(int)
-        part = place - low
-        mode = wrap.get(key, REPEAT)
-        cells = []
-        for cell in (low, low + 1):
-            if mode == CLAMP:
-                cells.append(np.clip(cell, 0, size - 1))
-            elif mode == MIRROR:
-                folded = cell % (2 * size)
-                cells.append(np.where(folded < size, folded, 2 * size - 1 - folded))
-            else:
-                cells.append(cell % size)
-        corners.append((cells, part[:, None]))
-    ((x0, x1), fx), ((y0, y1), fy) = corners
-    upper = image[y0, x0] * (1 - fx) + image[y0, x1] * fx
-    lower = image[y1, x0] * (1 - fx) + image[y1, x1] * fx
-    return np.asarray(upper * (1 - fy) + lower * fy)
+        levels = [picture.convert("RGBA")]
+    while min(levels[-1].size) >= 2 * SMALLEST:
+        levels.append(levels[-1].reduce(2))
+    return tuple(np.asarray(level) for level in levels)

@@ -24,7 +24,7 @@ from sixpoint.body.surface.appearance import Appearance
 from sixpoint.body.surface.shape import Shape
 from sixpoint.errors import FigureError, FormatError, SixpointError
 from sixpoint.formats.gltf.animation import DEFAULT_RATE, Channel, find_grid, read_channels, warn_of_scales
-from sixpoint.formats.gltf.appearance import bake_appearance
+from sixpoint.formats.gltf.appearance import read_appearance
 from sixpoint.formats.gltf.binding import check_one_body, find_bind_pose, place_bind_pose, read_skins
 from sixpoint.formats.gltf.document import Document, read_document
 from sixpoint.formats.gltf.humanoid import BONE_ROLES, Humanoid, find_humanoid
@@ -80,8 +80,8 @@ class Avatar:
 
     @cached_property
     def appearance(self) -> Appearance | None:
-        """Colours of the shape's vertices; None without a shape. Textures are decoded on first use."""
-        return bake_appearance(self.document, self.pieces) if self.pieces else None
+        """Colours and textures of the shape; None without one. Textures are decoded on first use."""
+        return read_appearance(self.document, self.pieces) if self.pieces else None
 
     @property
     def animations(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
 from sixpoint.body.human_bones import BonePoser
 from sixpoint.body.motion import Motion
+from sixpoint.body.soles import ankle_height
 from sixpoint.errors import FigureError, listed
 from sixpoint.formats.gltf.avatar import Avatar
 from sixpoint.formats.gltf.builder import Builder
@@ -119,12 +120,12 @@ def _bones_of_map(motion: Motion, avatar: Avatar) -> _Bones:
 
 
 def _bones_of_figure(motion: Motion, figure: Figure) -> _Bones:
-    poser = BonePoser(figure, upper_chest=True)
+    poser = BonePoser(figure, upper_chest=True, chords=True)
     names = [_lowered(name) for name in poser.bones]
     parents = [names.index(_lowered(b.parent)) if b.parent else -1 for b in poser.bones.values()]
     offsets = poser.offsets.copy()
     offsets[0] = (0.0, _hips_height(figure), 0.0)
-    return _Bones(names, parents, offsets, poser.compute_rotations(motion), poser.compute_hips(motion))
+    return _Bones(names, parents, offsets, poser.follow_chords(motion), poser.compute_hips(motion))
 
 
 def _lowered(name: str) -> str:
@@ -133,7 +134,6 @@ def _lowered(name: str) -> str:
 
 
 def _hips_height(figure: Figure) -> float:
-    """Height of the pelvis joint over the lowest point of the standing figure [m]."""
-    rest, carriers = figure.rest_positions, figure.skeleton.site_parents
-    sites = rest[carriers] + rot.mul_vec(figure.neutral[carriers], figure.skeleton.site_offsets)
-    return float(rest[figure.roles.pelvis, 1] - min(rest[:, 1].min(), sites[:, 1].min(initial=np.inf)))
+    """Height of the pelvis joint over the soles of the standing figure [m]."""
+    rest, roles = figure.rest_positions, figure.roles
+    return float(rest[roles.pelvis, 1] - rest[list(roles.ankle), 1].mean()) + ankle_height(figure)
