@@ -63,7 +63,9 @@ def _load_arrays(path: Path) -> dict[str, Array]:
         raise
     except Exception as error:  # NumPy and zipfile raise many kinds on damaged archives
         raise FormatError(
-            path, "not an NPZ file, or a damaged one", expected="arrays of numbers and texts as np.savez writes"
+            path,
+            "not an NPZ file, or a damaged one",
+            expected="arrays of numbers and texts as np.savez writes",
         ) from error
     return arrays
 

@@ -37,7 +37,9 @@ def read_marker_npz(path: Path) -> RawMarkers:
         raise
     except Exception as error:  # NumPy and zipfile raise many kinds on damaged archives
         raise FormatError(
-            path, "not an NPZ file, or a damaged one", expected="arrays of numbers and texts as np.savez writes"
+            path,
+            "not an NPZ file, or a damaged one",
+            expected="arrays of numbers and texts as np.savez writes",
         ) from error
     for name in ("names", "positions", "rate"):
         if name not in arrays:
