@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,7 +65,8 @@ LIBRARIES = {
 
 THIRD_PARTY = {"trimesh"}.union(*LIBRARIES.values())
 
-FILES = sorted(p for p in PACKAGE.rglob("*.py") if p != PACKAGE / "__init__.py")
+OFFERS = (PACKAGE / "__init__.py", PACKAGE / "api.py")  # import all that the library offers
+FILES = sorted(p for p in PACKAGE.rglob("*.py") if p not in OFFERS)
 
 
 def imports(path: Path) -> set[str]:
@@ -104,6 +107,16 @@ def test_every_public_name_has_one_place_and_a_docstring():
     for name in sp.__all__:
         value = getattr(sp, name)
         assert isinstance(value, (dict, tuple)) or (value.__doc__ and len(value.__doc__) > 15), name
+
+
+def test_a_command_line_begins_without_the_library():
+    """What takes a second to import is imported when it is needed; names of the library are there too."""
+    code = (
+        "import sys, sixpoint.cli.app; heavy = {'numba', 'scipy', 'sixpoint.api'} & set(sys.modules); "
+        "import sixpoint; assert not heavy, heavy; assert 'Figure' in dir(sixpoint); sixpoint.Figure; "
+        "assert not hasattr(sixpoint, 'nonsense')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_files_stay_small():

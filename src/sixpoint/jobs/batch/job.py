@@ -207,6 +207,9 @@ def _follow(
                     _write(out, table)
                     written = time.monotonic()
     except (KeyboardInterrupt, SixpointError):
+        table |= {
+            outcome.label: outcome for outcome in read_records(out)
+        }  # also what nobody was told any more
         count = done + sum(outcome.status == DONE for outcome in fresh.values())
         if fresh:
             log.warning(f"{count} of {total} are done; the same command goes on from there")
