@@ -364,6 +364,7 @@ def test_feet_are_level_in_the_neutral_pose(data, path):
 def test_a_label_that_leaves_its_foot_does_little(data):
     """nick_freeform: in the last 126 frames RTOE is a point at the height of the shoulders."""
     markers = load_markers(data / "c3d" / "nimblephysics_nick_freeform_001.c3d")
+    markers = markers.selected([name for name in markers.names if not name.endswith("HIP")])  # of the thigh
     found = calibrate_markers(markers)
     posed = pose_markers(found, markers.sliced(slice(None, None, 8)))
     toe = posed.residuals[:, found.names.index("Nick01:RTOE")]
