@@ -3,9 +3,10 @@
 1. Known people: 41 and 24 misplaced markers on the built-in motions, with skin that slides: errors of joints
    when the found figure is posed by its markers, of lengths, and residuals.
 2. A take that exists as markers (C3D) and as a skeleton (AMC), where there is one: distances of joints after
-   one rigid alignment of the two worlds, and the mean of each joint, which is mostly another idea of where
-   a joint is.
-3. All marker files: residuals, stature, time.
+   one rigid alignment of the two worlds; what of them is constant in the segment is another idea of where a
+   joint is, or a wrong length.
+3. Files with joint centres of their own: how far ours are from these, which the calibration does not see.
+4. All marker files: residuals, stature, time.
 
     python benchmarks/marker_calibration.py [--data FOLDER] [--seeds 4]
 """
@@ -19,6 +20,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from takes import compare_take, find_lag
 
 import sixpoint as sp
 from sixpoint.body import rotations as rot
@@ -42,7 +44,7 @@ CMU41 = (
     "RWRB RFIN LFWT RFWT LBWT RBWT LTHI LKNE LSHN LANK LHEE LTOE LMT5 RTHI RKNE RSHN RANK RHEE RTOE RMT5"
 )
 NOISE, SKIN = 0.001, 0.015  # of each sample [m]; how far skin slides per radian of its joints [m]
-JOINTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+FAR = 0.1  # samples farther from their places are labels in error, and counted [m]
 STATIC = {"opensim_subject01_walk.trc": "opensim_subject01_static.trc"}
 
 
@@ -106,52 +108,54 @@ def known_errors(posed, motion: sp.Motion, figure: sp.Figure, found: MarkerModel
 def measure_take(markers: Markers, motion: sp.Motion) -> None:
     """Print distances between a take's AMC and the figure that follows from its markers."""
     for title, layout in (("all", None), ("24", "markers24")):
-        some = (
-            markers
-            if layout is None
-            else markers.selected(list(find_marker_roles(markers.names, layout).roles))
-        )
-        found = calibrate_markers(some)
-        posed = pose_markers(found, some.sliced(slice(None, None, 4)))
-        theirs = sp.Figure.from_motion(motion)
-        frames = min(len(posed.motion), -(-len(motion) // 4))
-        a, names = landmarks(posed.motion.positions[:frames], found.figure)
-        b, _ = landmarks(motion.positions[::4][:frames], theirs)
-        aligned = align(a, b)
-        apart = np.linalg.norm(aligned - b, axis=2)
+        labels = list(find_marker_roles(markers.names, layout).roles)
+        some = markers if layout is None else markers.selected(labels)
+        posed = pose_markers(calibrate_markers(some), some)
+        apart = compare_take(posed.motion, motion)
         print(
-            f"{markers.name}, {title} markers: joints {100 * apart.mean():.2f} cm, "
-            f"residual {100 * posed.rms:.2f} cm"
+            f"{markers.name}, {title} markers: joints {100 * apart.mean:.2f} cm, residual "
+            f"{100 * posed.rms:.2f} cm; the AMC is {find_lag(posed.motion, motion)} frames late, the worlds' "
+            f"verticals {apart.turned:.1f} deg apart"
         )
-        print("  ", ", ".join(f"{n} {100 * x:.1f}" for n, x in zip(names, apart.mean(axis=0), strict=True)))
+        print("    joint          mean cm   constant: left, up, forward   varying")
+        for k, name in enumerate(apart.names):
+            left, up, front = 100 * apart.constant[k]
+            print(
+                f"    {name:14} {100 * apart.distance[:, k].mean():6.1f} {left:14.1f} {up:6.1f} {front:6.1f} "
+                f"{100 * apart.varying[k]:14.1f}"
+            )
 
 
-def landmarks(positions: np.ndarray, figure: sp.Figure) -> tuple[np.ndarray, list[str]]:
-    """(F, N, 3) limb joints, the middle of the hips, where the arms part, and the head joint."""
-    r, names, columns = figure.roles, [], []
-    for joint in JOINTS:
-        for side, index in zip("lr", getattr(r, joint), strict=True):
-            names.append(f"{side}_{joint}")
-            columns.append(positions[:, index])
-    chest = figure.skeleton.common_ancestor(list(r.shoulder))
-    columns += [positions[:, list(r.hip)].mean(axis=1), positions[:, chest], positions[:, r.head]]
-    return np.stack(columns, axis=1), [*names, "pelvis", "chest", "head"]
+def measure_centres(path: Path) -> None:
+    """Print how far joints are from the centres in a file, which the calibration does not see."""
+    markers = load_markers(path)
+    roles = find_marker_roles(markers.names).roles
+    centres = {role: label for label, role in roles.items() if role.endswith("_centre") and role[1] == "_"}
+    if not centres:
+        return
+    models = ("_centre", "_centre_regression")
+    skin = markers.selected([name for name in markers.names if not roles.get(name, "").endswith(models)])
+    posed = pose_markers(calibrate_markers(skin), skin)
+    skeleton, row = posed.motion.skeleton, []
+    for role, label in centres.items():
+        ours = posed.motion.positions[:, skeleton.index(role.removesuffix("_centre"))]
+        apart = np.linalg.norm(ours - markers.positions[:, markers.index(label)], axis=1)
+        row.append(f"{role.removesuffix('_centre')} {100 * np.nanmean(apart):.1f}")
+    print(f"{path.name:46} {', '.join(row)}")
 
 
-def align(points: np.ndarray, onto: np.ndarray) -> np.ndarray:
-    """One rigid motion for the whole take."""
-    a, b = points.reshape(-1, 3), onto.reshape(-1, 3)
-    left, _, right = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
-    turn = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
-    return ((a - a.mean(0)) @ turn.T + b.mean(0)).reshape(points.shape)
+def marker_files(data: Path) -> list[Path]:
+    """All recordings of markers."""
+    return sorted([*(data / "c3d").glob("*.c3d"), *(data / "trc").glob("*.trc")])
 
 
 def measure_files(data: Path) -> None:
     """Print one row per marker file."""
     print(
-        "file                            markers  residual cm  worst marker cm    stature m  seconds  missing"
+        "file                                          markers  residual cm  samples far  worst marker cm"
+        "     stature m  seconds  missing"
     )
-    for path in sorted([*(data / "c3d").glob("*.c3d"), *(data / "trc").glob("*.trc")]):
+    for path in marker_files(data):
         try:
             markers = load_markers(path)
             still = path.parent / STATIC.get(path.name, "-")
@@ -163,11 +167,14 @@ def measure_files(data: Path) -> None:
         except sp.SixpointError as error:
             print(f"{path.name:32} {error}")
             continue
-        per_marker = np.sqrt(np.nanmean(posed.residuals**2, axis=0))
+        far = posed.residuals > FAR
+        near = np.where(far, np.nan, posed.residuals)
+        per_marker = np.sqrt(np.nanmean(near**2, axis=0))
         worst = int(np.nanargmax(per_marker))
         print(
-            f"{path.name:32} {len(found.names):6} {100 * posed.rms:12.2f} {100 * per_marker[worst]:8.2f} "
-            f"{found.names[worst]:8} {stature_of(found.figure):10.2f} {took:8.1f}  {', '.join(found.missing)}"
+            f"{path.name:46} {len(found.names):6} {100 * np.sqrt(np.nanmean(near**2)):12.2f} {far.sum():8} "
+            f"{100 * per_marker[worst]:8.2f} {found.names[worst]:18} {stature_of(found.figure):10.2f} "
+            f"{took:8.1f}  {', '.join(found.missing)}"
         )
 
 
@@ -183,6 +190,8 @@ def main() -> None:
         take = given.data / "cmu" / f"{path.stem}.amc"
         if take.exists():
             measure_take(load_markers(path), load(take))
+    for path in marker_files(given.data):
+        measure_centres(path)
     if given.data.is_dir():
         measure_files(given.data)
     else:

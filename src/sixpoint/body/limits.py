@@ -20,6 +20,11 @@ from sixpoint.errors import FormatError
 Array = NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
+SUBTALAR = np.array([0.0, np.sin(np.radians(42.0)), np.cos(np.radians(42.0))])
+"""The foot rolls about an axis that rises by 42 degrees to the front: Inman 1976, "The joints of the ankle".
+
+Its deviation inward, 23 degrees, is left out: hinges of one joint are at right angles.
+"""
 
 
 @dataclass(frozen=True)
@@ -130,13 +135,13 @@ class Limits:
         return _two_hinges(Z, X, (low, high), (-radial, ulnar))
 
     def ankle(self, side: float) -> Hinges:
-        """Dorsiflexion (negative about +X), then inversion: the sole turns inward."""
+        """Dorsiflexion (negative about +X), then inversion about the subtalar axis: the sole turns inward."""
         entry = self._extremity("ankle")
         dorsal, plantar, inner, outer = np.radians(
             [entry[name] for name in ("dorsiflexion", "plantarflexion", "inversion", "eversion")]
         )
         low, high = (-inner, outer) if side > 0 else (-outer, inner)
-        return _two_hinges(X, Z, (-dorsal, plantar), (low, high))
+        return _two_hinges(X, SUBTALAR, (-dorsal, plantar), (low, high))
 
     def _extremity(self, role: str) -> Mapping[str, float]:
         """Ranges that a user's table may leave to the shipped one."""

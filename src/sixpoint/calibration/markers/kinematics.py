@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.anthropometry import build_skeleton, segments_of_stature
+from sixpoint.body.limits import SUBTALAR
 from sixpoint.body.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -39,21 +40,11 @@ class Block:
     range: tuple[float, float] = (-np.inf, np.inf)
 
 
-SUBTALAR = np.radians([42.0, 23.0])
-"""The axis of inversion rises to the front and points inward [rad]; Inman 1976, "The joints of the ankle"."""
-
-
-def _subtalar_axis(side: str) -> Array:
-    rise, inward = SUBTALAR
-    forward = np.array([-np.sin(inward) if side == "l" else np.sin(inward), 0.0, np.cos(inward)])
-    return np.asarray(np.cos(rise) * forward + np.sin(rise) * Y)
-
-
 def _limb_blocks(side: str) -> list[Block]:
     return [
         Block((f"{side}_hip",), (40, 20, 30)),
         Block((f"{side}_knee",), (60,), (X,), (0, 160)),
-        Block((f"{side}_ankle",), (25, 12), (X, _subtalar_axis(side))),
+        Block((f"{side}_ankle",), (25, 12), (X, SUBTALAR)),
         Block((f"{side}_sternoclavicular",), (8, 10, 10)),
         Block((f"{side}_shoulder",), (60, 50, 60)),
         Block((f"{side}_elbow",), (60, 45), (X, Y), (-155, 0)),
