@@ -23,6 +23,8 @@ from pathlib import Path
 import numpy as np
 from lost_limbs import MISPLACED, NOISE, SAMPLES, core_joints, sweep
 from marked import rewrite
+from track_take import COLUMNS as TAKES
+from track_take import measure_take
 from virtual_markers import drop, misplace, place_virtual, record
 
 import sixpoint as sp
@@ -234,9 +236,8 @@ def main() -> None:
         try:
             if amc.is_file():
                 truth = sp.load(amc)
-                rig = sp.Figure.from_motion(truth)
                 pairs += [
-                    chain_row(path.stem, load_markers(path), truth, rig, layout) for layout in (None, LAYOUT)
+                    measure_take(path.stem, load_markers(path), truth, layout) for layout in (None, LAYOUT)
                 ]
                 print(*pairs[-2], "|", *pairs[-1], flush=True)
             if "static" not in path.stem.lower():
@@ -251,7 +252,7 @@ def main() -> None:
         "known": table(KNOWN, known),
         "robust": table(ROBUST, robust),
         "chain": table(CHAIN, chain),
-        "cmu": table(CHAIN, pairs) if pairs else NOTHING.format("take as both C3D and AMC"),
+        "cmu": table(TAKES, pairs) if pairs else NOTHING.format("take as both C3D and AMC"),
         "files": table(FILES, files) if files else NOTHING.format("recording of markers"),
         "live": table(LIVE, live),
     }  # fmt: skip
