@@ -27,7 +27,14 @@ PROPORTION_STD = {  # of the logarithm of each length, the stature apart
     "hand": 0.06,
 }
 LOOSE = 2.0  # postures of a movement may be this many times as far from neutral as the kinematics' priors say
-STIFF = {"l_sternoclavicular": 1.5, "r_sternoclavicular": 1.5, "vl5": 2.0, "vt6": 2.0}
+STIFF = {
+    "l_sternoclavicular": 1.5,
+    "r_sternoclavicular": 1.5,
+    "vl5": 2.0,
+    "vt6": 2.0,
+    "l_ankle": 1.5,
+    "r_ankle": 1.5,
+}
 """These no farther, in any frame."""
 STATIC_STD = {"l_knee": 6, "r_knee": 6, "l_ankle": 8, "r_ankle": 8, "vl5": 8, "vt6": 8, "vc4": 12}  # [deg]
 
