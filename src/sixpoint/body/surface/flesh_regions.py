@@ -65,7 +65,8 @@ def neutral_surface(figure: Figure) -> tuple[Array, Index]:
     shape = figure.shape
     assert shape is not None
     positions, world = figure.neutral_pose.compute_transforms()
-    vertices = shape.place(positions, world) - positions[0] + figure.rest_positions[0]
+    pelvis = figure.roles.pelvis  # a root above it stands still, while a pose may have the pelvis anywhere
+    vertices = shape.place(positions, world) - positions[pelvis] + figure.rest_positions[pelvis]
     carrier = shape.joints[np.arange(len(vertices)), shape.weights.argmax(axis=1)]
     return vertices, parts_of_joints(figure)[carrier]
 
