@@ -9,27 +9,33 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.figure import Figure
+from sixpoint.body.stature import stature_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-HEIGHT = 1.6  # Figure.height for which lengths are given [m]
 SPACING = 0.012  # m, between points of a surface
 TRUNK, NECK, HEAD, UPPER, LOWER, HAND, THIGH, SHANK, FOOT = range(9)
 SHARE = 0.995  # of the vertices around a bone that its radius encloses
 
 # A trunk without a shape, from the hips (0) over the waist to the shoulders (1): half widths and half depth
-# of elliptic cylinders as shares of the figure's height; at the shoulders about 3/4 of half their width.
+# of elliptic cylinders as shares of the stature; at the shoulders about 3/4 of half their width.
 HEIGHTS = (0.0, 0.45, 0.8, 1.0)
 WIDTHS = (0.09, 0.075, 0.09, 0.09)
 DEPTH = 0.06
-ELBOW = 0.045  # m, radius of an elbow without a shape, for a height of 1.6 m
+ELBOW = 0.045  # m, radius of an elbow without a shape, for the mean stature
 ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))  # m, likewise
-THIGH_RADII = (0.092, 0.06)  # at hip and knee, for a height of 1.6 m [m]
+THIGH_RADII = (0.092, 0.06)  # at hip and knee, likewise [m]
 ENCLOSED = 0.9  # of the vertices of a thigh that its radii enclose
 NEAR_HIP = 0.25  # share of a thigh above which another one cannot be kept away: hips stand still
 BESIDE = 2e-3  # m, half of the least gap between neutral thighs
+
+
+def unit_of(figure: Figure) -> float:
+    """How many times as tall as the mean a figure is, for which lengths here are given."""
+    return stature_of(figure) / MEAN_STATURE
 
 
 def parts_of_joints(figure: Figure) -> Index:
@@ -103,7 +109,7 @@ def spread_points(vertices: Array, triangles: Index) -> Array:
 def bare_trunk(figure: Figure, head: bool) -> Array:
     """Points of elliptic cylinders in place of a trunk, and of a ball for a head [m]."""
     roles, rest = figure.roles, figure.rest_positions
-    unit = figure.height / HEIGHT
+    unit, stature = unit_of(figure), stature_of(figure)
     hips, shoulders = rest[list(roles.hip)], rest[list(roles.shoulder)]
     low, high = hips[:, 1].mean() - 0.05 * unit, shoulders[:, 1].mean() + 0.03 * unit
     middle = np.array([hips.mean(axis=0), shoulders.mean(axis=0)])
@@ -111,7 +117,7 @@ def bare_trunk(figure: Figure, head: bool) -> Array:
     rings = []
     for y in np.arange(low, high + SPACING, SPACING):
         t = (min(y, high) - low) / (high - low)
-        width, depth = np.interp(t, HEIGHTS, WIDTHS) * figure.height, DEPTH * figure.height
+        width, depth = np.interp(t, HEIGHTS, WIDTHS) * stature, DEPTH * stature
         centre = middle[0] + t * (middle[1] - middle[0])
         x, z = centre[0] + width * np.cos(angles), centre[2] + depth * np.sin(angles)
         rings.append(np.column_stack([x, np.full_like(x, min(y, high)), z]))
@@ -145,7 +151,7 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
         half: How far to both sides to look [m].
         forearm: On the line from elbow to wrist; else on that from elbow to shoulder.
     """
-    roles, unit = figure.roles, figure.height / HEIGHT
+    roles, unit = figure.roles, unit_of(figure)
     lower = float(np.linalg.norm(figure.offset_between(roles.elbow[0], roles.wrist[0])))
     part = (LOWER if along <= lower else HAND) if forearm else UPPER
     bare = (ELBOW if forearm and along == 0.0 else dict(ARM_RADII)[part]) * unit
@@ -172,7 +178,7 @@ def thigh_radii(figure: Figure) -> tuple[float, float]:
     Thighs that touch in the neutral pose are narrower here, by half of what they would share a quarter of
     their length below the hips or at the knees: else they could never be beside each other.
     """
-    roles, rest, unit = figure.roles, figure.rest_positions, figure.height / HEIGHT
+    roles, rest, unit = figure.roles, figure.rest_positions, unit_of(figure)
     radii = np.array(THIGH_RADII) * unit
     if figure.shape is not None:
         vertices, parts = neutral_surface(figure)

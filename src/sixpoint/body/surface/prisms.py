@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.surface.flesh_regions import arm_radius, bare_trunk, trunk_points
+from sixpoint.body.surface.flesh_regions import arm_radius, bare_trunk, trunk_points, unit_of
 
 Array = NDArray[np.float64]
 
@@ -24,9 +24,8 @@ DIRECTIONS = 32
 SLICES = 7
 OVERLAP = 0.02  # m, by which prisms of bent neighbours run into each other
 LEAST = 1e-3  # m, least radius of an outline
-REGION = 0.08  # of an elbow: so far along upper arm and forearm, for a height of 1.6 m [m]
+REGION = 0.08  # of an elbow: so far along upper arm and forearm, for the mean stature [m]
 FOREARM_SHARES = (0.55, 0.8, 1.0, 1.3)  # places on the line elbow-wrist; the last is in the hand
-HEIGHT = 1.6  # Figure.height for which lengths are given [m]
 
 
 def directions() -> Array:
@@ -106,7 +105,7 @@ def build_prisms(figure: Figure, chain: SpineChain | None = None, *, head: bool 
         head: Whether neck and head have prisms too.
     """
     chain = chain or figure.spine_chain
-    unit = figure.height / HEIGHT
+    unit = unit_of(figure)
     radius = arm_radius(figure, REGION * unit, 0.0, 0.5 * REGION * unit, forearm=True)
     points = trunk_points(figure, head) if figure.shape is not None else bare_trunk(figure, head)
     prisms = []

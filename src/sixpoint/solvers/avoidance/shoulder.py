@@ -27,9 +27,7 @@ def draw_clavicle(model, limits, limb, angle, base, world, frame, place):
     row = model.segments.shape[0] + limb
     chest, bone = qt.load(world, model.chest[limb]), vec.load(model.clavicles, limb)
     tilt = TILT * angle if limb == 0 else -TILT * angle
-    turn = qt.mul(
-        qt.from_axis_angle((0.0, 1.0, 0.0), angle), qt.from_axis_angle((1.0, 0.0, 0.0), tilt)
-    )
+    turn = qt.mul(qt.from_axis_angle((0.0, 1.0, 0.0), angle), qt.from_axis_angle((1.0, 0.0, 0.0), tilt))
     turned = qt.mul(base, turn)
     if limits:
         turned, _ = clamp(model.balls, row, turned)
