@@ -28,6 +28,9 @@ DEPTH = 0.06
 ELBOW = 0.045  # m, radius of an elbow without a shape, for the mean stature
 ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))  # m, likewise
 THIGH_RADII = (0.092, 0.06)  # at hip and knee, likewise [m]
+WRIST, PALM = 0.026, 0.02  # m, radius of a wrist, and half the thickness of a hand, likewise
+# Across a hand: how far beyond the wrist, and its edges from the line of the forearm, the thumb's last [m].
+HAND_EDGES = ((0.075, -0.03, 0.085), (0.145, -0.012, 0.064))
 ENCLOSED = 0.9  # of the vertices of a thigh that its radii enclose
 NEAR_HIP = 0.25  # share of a thigh above which another one cannot be kept away: hips stand still
 BESIDE = 2e-3  # m, half of the least gap between neutral thighs
@@ -170,6 +173,35 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
             off = np.linalg.norm(arm[near] - t[near, None] * axis, axis=1)
             widest = max(widest, float(np.quantile(off, SHARE)))
     return widest if 0.0 < widest < 3.0 * bare else bare
+
+
+def hand_balls(figure: Figure) -> list[tuple[float, float, float]]:
+    """Balls of a hand that goes straight on from the forearm: the wrist, then two across palm and fingers.
+
+    Each is how far beyond the wrist and how far beside its line, to the thumb's side, and its radius [m].
+    They lie at both edges of the hand's flesh and are as thick as that, the mean of both hands.
+    """
+    unit, roles = unit_of(figure), figure.roles
+    found = [(0.0, 0.0, WRIST * unit)]
+    flat = []
+    if figure.shape is not None:
+        vertices, parts = neutral_surface(figure)
+        for k in range(2):
+            elbow, wrist = (figure.rest_positions[j[k]] for j in (roles.elbow, roles.wrist))
+            hand = vertices[parts == HAND + 16 * k] - wrist
+            along = (wrist - elbow) / max(float(np.linalg.norm(wrist - elbow)), 1e-9)
+            flat.append(np.column_stack([hand @ along, np.abs(hand[:, 0]), hand[:, 2]]))
+    for beyond, low, high in HAND_EDGES:
+        edges, radius = np.array([low, high]) * unit, PALM * unit
+        near = [f[np.abs(f[:, 0] - beyond * unit) < 0.02 * unit] for f in flat]
+        if near and all(len(f) >= 8 for f in near):
+            edges = np.mean([[f[:, 2].min(), f[:, 2].max()] for f in near], axis=0)
+            radius = float(np.clip(np.mean([f[:, 1].max() for f in near]), 0.5 * radius, 1.5 * radius))
+        found += [
+            (beyond * unit, float(edges[0]) + radius, radius),
+            (beyond * unit, float(edges[1]) - radius, radius),
+        ]
+    return found
 
 
 def thigh_radii(figure: Figure) -> tuple[float, float]:

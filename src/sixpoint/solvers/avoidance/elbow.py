@@ -39,7 +39,7 @@ from sixpoint.solvers.tgb.swivel import hinge_at, root_at, triangle
 
 K = 1.0  # of a bent arm's first turn
 MET = 1e-3  # m, an arm that misses by less is on its target
-STRETCHES = 8  # turns of a stretched arm
+STRETCHES = 2  # turns of a stretched arm
 COARSE_STEP = pi / 4  # rad, in which an arm that misses looks for another swivel angle
 STRAIGHT = 0.01  # sine between upper arm and target below which a swivel angle moves nothing
 GIVES = 0.02  # m, an arm that misses by so much gives way wholly

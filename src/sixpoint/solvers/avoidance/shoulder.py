@@ -14,7 +14,7 @@ MOST = 0.35  # rad, of a clavicle
 TILT = 1.5  # of its turn about itself: backward where it goes forward, as when an arm is raised
 SPEED = 6.0  # rad/s
 GAIN = 1e-4  # m, less is no way out
-TRIES = 5  # of finding the least angle that frees the arm
+TRIES = 3  # of finding the least angle that frees the arm
 CLOSE = 5e-3  # rad, an angle so near to the least one is it
 
 

@@ -15,7 +15,7 @@ from sixpoint.solvers.six_points.packing import limb_row
 from sixpoint.solvers.tgb.swivel import across, direction, triangle
 
 GROWTH = 1.7  # of the steps in which a free swivel angle is looked for
-LEAST_STEP, LARGEST_STEP = pi / 90, pi / 15  # rad
+LEAST_STEP, LARGEST_STEP = pi / 90, pi / 9  # rad
 STEPS_OUT = 5  # of a bent arm to one side, before both are looked at
 BESIDE = 2e-3  # m, where secant steps aim
 REFINEMENTS = 4
