@@ -7,7 +7,7 @@ from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.packing import THIGH_HEADER
 
 FIRST = 0.25  # as ``body.flesh_regions.NEAR_HIP``; written out, see ``packing``
-BELOW_HIP = 0.0  # the same for arms
+BELOW_HIP = 0.25  # the same for arms: nearer to the hip flesh is rounder than a capsule
 ROUNDS = 3  # of finding the nearest points of two capsules
 WIDEST = 4.0  # m, beyond any gap
 
