@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 AVOIDABLE = ("elbows", "forearms", "thighs", "arms")
 """What can be kept apart: elbows and trunk; forearms and hands, and trunk and head; thigh and thigh; arms and
-thighs (elbows then stay out of the trunk too)."""
+thighs (elbows then stay out of the trunk too), which is experimental: see docs/collision.md."""
 
 
 def check_avoid(names: Sequence[str] | None) -> tuple[str, ...]:
