@@ -196,7 +196,7 @@ def hand_balls(figure: Figure) -> list[tuple[float, float, float]]:
         near = [f[np.abs(f[:, 0] - beyond * unit) < 0.02 * unit] for f in flat]
         if near and all(len(f) >= 8 for f in near):
             edges = np.mean([[f[:, 2].min(), f[:, 2].max()] for f in near], axis=0)
-            radius = float(np.clip(np.mean([f[:, 1].max() for f in near]), 0.5 * radius, radius))
+            radius = float(np.clip(np.mean([f[:, 1].max() for f in near]), 0.5 * radius, 1.5 * radius))
         found += [
             (beyond * unit, float(edges[0]) + radius, radius),
             (beyond * unit, float(edges[1]) - radius, radius),

@@ -27,6 +27,7 @@ WIDTH = HEADER + SLICES * RING
 BALL = 4
 SPREAD, FIRST_BALL = 1, 2
 THIGH_HEADER = 2
+PALM = 0.02  # m, most of a hand beside a thigh: they touch where a body just stands
 
 
 class Flesh(NamedTuple):
@@ -83,7 +84,9 @@ def pack_thighs(radii, balls, lengths, apart):
     if balls:
         wrist = min((b for b in balls if b.forearm), key=lambda ball: abs(ball.share - 1.0))
         table[1, :2] = _spread(balls, lengths), wrist.radius
-        table[THIGH_HEADER:] = [(b.forearm, b.share, b.radius, b.beside) for b in balls]
+        table[THIGH_HEADER:] = [
+            (b.forearm, b.share, min(b.radius, PALM) if b.share > 1.0 else b.radius, b.beside) for b in balls
+        ]
     return table
 
 
