@@ -31,7 +31,17 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 METHODS = ("sik", "sik+", "sik-prior")
 DEEP = 0.005  # m, a penetration that counts
 SEEDS = (1, 2, 3, 4, 5, 6)
-PARTS = ("reaches", "wandering", "forearms", "thighs", "arms", "boxing")
+PARTS = ("reaches", "wandering", "boxing", "recordings", "forearms", "thighs", "arms")
+RECORDINGS = (  # development test sets; nobody's motion was fitted on them
+    "cmu/14_02.amc",
+    "cmu/14_24.amc",
+    "cmu/14_29.amc",
+    "xsens/example_2.bvh",
+    "bandai/dataset-1_bow_normal_001.bvh",
+    "bandai/dataset-1_punch_normal_001.bvh",
+    "bandai/dataset-2_walk_normal_001.bvh",
+)
+BOXING = "paper/17_10.amc"  # tests only
 
 
 @dataclass(frozen=True)
@@ -39,6 +49,7 @@ class Row:
     """What avoidance does to one method on some targets.
 
     Attributes:
+        points: What the targets are.
         method: Its name.
         frames: How many.
         deep: Frames with an elbow more than 5 mm in the trunk, without and with.
@@ -54,6 +65,7 @@ class Row:
         still: Frames in which both arms are posed as without.
     """
 
+    points: str
     method: str
     frames: int
     deep: tuple[int, int]
@@ -80,7 +92,7 @@ def time_pair(plain: sp.Solver, clear: sp.Solver, targets: Sequence[sp.Targets])
     return float(np.median(times[0])) / frames, float(np.median(times[1])) / frames
 
 
-def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter: Meter) -> Row:
+def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter: Meter, points: str) -> Row:
     """One method with and without avoidance."""
     solvers = [sp.make_solver(method, figure, **more) for more in ({}, {"avoid": "elbows"})]
     found = [[solver.solve_frames(part) for part in targets] for solver in solvers]
@@ -99,6 +111,7 @@ def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter
     whole = sp.Motion.from_poses([s.motion.pose(f) for s in found[1] for f in range(len(s.motion))], 60.0)
     plain, clear = time_pair(*solvers, targets)
     return Row(
+        points,
         method,
         len(depths[0]),
         tuple(int((d.max(axis=1) > DEEP).sum()) for d in depths),
@@ -116,15 +129,15 @@ def compare(figure: sp.Figure, method: str, targets: Sequence[sp.Targets], meter
 def table(rows: Sequence[Row]) -> str:
     """Rows as Markdown."""
     lines = [
-        "| method | frames | elbow deeper than 5 mm | with avoidance | fewer by | left, bound by limits "
-        "| deepest | with avoidance | on target without, still within 1 mm "
+        "| points | method | frames | elbow deeper than 5 mm | with avoidance | fewer by "
+        "| left, bound by limits | deepest | with avoidance | on target without, still within 1 mm "
         "| arms off target that move: miss grows, median (95 %) | unchanged frames | time |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for r in rows:
         fewer = f"{100 * (1 - r.deep[1] / r.deep[0]):.1f} %" if r.deep[0] else "-"
         lines.append(
-            f"| `{r.method}` | {r.frames} | {r.deep[0]} | {r.deep[1]} | {fewer} "
+            f"| {r.points} | `{r.method}` | {r.frames} | {r.deep[0]} | {r.deep[1]} | {fewer} "
             f"| {r.bound[0]}, {r.bound[1]} | {1e3 * r.worst[0]:.0f} mm "
             f"| {1e3 * r.worst[1]:.0f} mm | {100 * r.kept:.2f} % of {r.met} "
             f"| {r.lost[0]}: {1e3 * r.lost[1]:+.0f} mm ({1e3 * r.lost[2]:+.0f} mm) | {r.still} "
@@ -203,14 +216,21 @@ FOREARMS = (
 )
 
 
-def boxing_targets(figure: sp.Figure, folder: Path) -> tuple[sp.Figure, sp.Targets, str]:
-    """The paper's boxing clip on its own rig, or the built-in motion where it is absent; and which it is."""
-    path = folder / "paper" / "17_10.amc"
-    if path.exists():
-        motion = sp.load(path)
-        own = sp.Figure.from_motion(motion)
-        return own.with_shape(build_shape(own)), own.targets(motion), "CMU 17_10, the paper's boxing clip"
-    return figure, figure.targets(sp.make_sample("boxing", figure)), "the built-in boxing motion"
+def read(path: Path) -> tuple[sp.Figure, sp.Targets]:
+    """A recording's own figure with the built-in surface, and its points."""
+    motion = sp.load(path)
+    figure = sp.Figure.from_motion(motion)
+    return figure.with_shape(build_shape(figure)), figure.targets(motion)
+
+
+def compare_recordings(paths: Sequence[Path]) -> list[Row]:
+    """Rows of recordings on their own rigs; those that are not there are left out."""
+    rows = []
+    for path in paths:
+        if path.exists():
+            figure, targets = read(path)
+            rows += [compare(figure, m, [targets], Meter(figure), path.stem) for m in METHODS]
+    return rows
 
 
 def measure_part(part: str, figure: sp.Figure, frames: int, data: Path) -> str:
@@ -227,19 +247,22 @@ def measure_part(part: str, figure: sp.Figure, frames: int, data: Path) -> str:
             ]
             rows += [compare_legs(figure, kind, m, targets, part) for m in METHODS]
         return "\n".join(rows)
+    if part == "recordings":
+        return table(compare_recordings([data / name for name in RECORDINGS]))
     if part == "boxing":
-        own, boxing, name = boxing_targets(figure, data)
-        return f"On {name}:\n\n{table([compare(own, m, [boxing], Meter(own)) for m in METHODS])}"
-    make, most = (reach_across, frames) if part == "reaches" else (wander_around, min(frames, 200))
+        targets = [figure.targets(sp.make_sample("boxing", figure))]
+        rows = [compare(figure, m, targets, Meter(figure), "built-in boxing") for m in METHODS]
+        return table(rows + compare_recordings([data / BOXING]))
+    make, most = (reach_across, frames) if part == "reaches" else (wander_around, min(frames, 600))
     targets = [make(figure, seed, most) for seed in SEEDS]
-    return table([compare(figure, m, targets, Meter(figure)) for m in METHODS])
+    return table([compare(figure, m, targets, Meter(figure), part) for m in METHODS])
 
 
 def main() -> None:
     """Measure, print, and write into a page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", type=Path)
-    parser.add_argument("--frames", type=int, default=1000, help="of each reach; wandering has 200")
+    parser.add_argument("--frames", type=int, default=1000, help="of each reach; wandering has at most 600")
     parser.add_argument("--only", choices=PARTS, nargs="+", default=PARTS)
     parser.add_argument("--data", type=Path, default=DATA)
     options = parser.parse_args()

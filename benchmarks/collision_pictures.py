@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from collision import Meter
+from PIL import Image, ImageDraw
 from reaches import reach_across
 
 import sixpoint as sp
@@ -45,31 +46,65 @@ def outline(prism, radii, height):
     return np.vstack([ring, ring[:1]])
 
 
-def draw_depth(figure, motion, cleared, frame, side, path):
-    """The trunk's outline at the height of an elbow that is in it, and where the elbow goes."""
+def shrink(ring, by):
+    """A closed outline (n, 2), moved inward: the trunk as the elbow's ball feels it."""
+    along = np.roll(ring[:-1], -1, axis=0) - np.roll(ring[:-1], 1, axis=0)
+    across = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    outward = np.sign(np.sum(across * (ring[:-1] - ring[:-1].mean(axis=0)), axis=1))
+    moved = ring[:-1] - by * outward[:, None] * across
+    return np.vstack([moved, moved[:1]])
+
+
+def find_deepest(figure, motion, frame, side):
+    """Depth of an elbow [m], the centre of its deepest ball, and where that should be."""
     solver = sp.SequentialIK(figure, avoid="elbows")
     flesh = unpack_flesh(solver._arrays[-2], None, None, None)  # the trunk; the last array is of the thighs
-    prisms, chain = build_prisms(figure), figure.spine_chain
-    roles = figure.roles
+    chain, roles = figure.spine_chain, figure.roles
     positions, world = (array[frame] for array in motion.transforms)
     turned = rot.mul(world, rot.inv(figure.neutral))
     joints = [*chain.joints, roles.head]
     segs = np.pad(np.diff(positions[joints], axis=0), ((0, 0), (0, 1)))
     arm = [tuple(positions[getattr(roles, n)[side]]) for n in ("shoulder", "elbow", "wrist")]
-    depth, p_e, p_t = deepest(flesh, tuple(positions[joints[0]]), turned[list(chain.joints)], segs, *arm)
+    return deepest(flesh, tuple(positions[joints[0]]), turned[list(chain.joints)], segs, *arm)
+
+
+def mark_depth(picture, camera, ends):
+    """Draw into a picture (H, W, 3) the way from an elbow's deepest point to the trunk's outline."""
+    shown = Image.fromarray(picture)
+    pen, (a, b) = ImageDraw.Draw(shown), [tuple(p) for p in camera.project(np.array(ends))]
+    for colour, width, size in (("#ffffff", 8, 8), (WRONG, 4, 6)):
+        pen.line([a, b], fill=colour, width=width)
+        for x, y in (a, b):
+            pen.ellipse([x - size, y - size, x + size, y + size], fill=colour)
+    return np.asarray(shown)
+
+
+def draw_depth(figure, motion, cleared, frame, side, path):
+    """The trunk's outline at the height of an elbow that is in it, and where the elbow goes."""
+    prisms, roles = build_prisms(figure), figure.roles
+    positions, world = (array[frame] for array in motion.transforms)
+    turned = rot.mul(world, rot.inv(figure.neutral))
+    arm = [tuple(positions[getattr(roles, n)[side]]) for n in ("shoulder", "elbow", "wrist")]
+    depth, p_e, p_t = find_deepest(figure, motion, frame, side)
     after = cleared.positions[frame, roles.elbow[side]]
-    inside = {}
+    # The prism in which the elbow is deepest: the way out is across its Y axis and ends on its grown outline.
+    found = []
     for prism in prisms.prisms:
-        local = rot.mul_vec(rot.inv(turned[prism.joint]), np.array(p_e) - positions[prism.joint])
+        turn = rot.inv(turned[prism.joint])
+        local, way = rot.mul_vec(turn, np.array(p_e) - positions[prism.joint]), np.subtract(p_t, p_e)
         if prism.heights[0] <= local[1] <= prism.heights[-1]:
-            inside[prism.joint] = (prism, local)
-    prism, local = min(inside.values(), key=lambda pair: abs(pair[1][1] - pair[0].heights.mean()))
+            across = abs(rot.mul_vec(turn, way)[1]) / np.linalg.norm(way)
+            ring = outline(prism, prism.grown, local[1])
+            end = (local + rot.mul_vec(turn, way))[[0, 2]]
+            found.append((across + np.linalg.norm(ring - end, axis=1).min(), prism, local))
+    _, prism, local = min(found, key=lambda item: item[0])
 
     def seen(point):
         return rot.mul_vec(rot.inv(turned[prism.joint]), np.array(point) - positions[prism.joint])[[0, 2]]
 
     figure_, axes = plt.subplots(figsize=(7.2, 5.4))
-    flat, grown = outline(prism, prism.radii, local[1]), outline(prism, prism.grown, local[1])
+    grown = outline(prism, prism.grown, local[1])
+    flat = shrink(grown, prisms.radius)
     axes.fill(*flat.T, color=FLESH, zorder=1)
     axes.plot(*flat.T, color=INK, lw=1.4, zorder=2)
     axes.plot(*grown.T, color=INK, lw=1, ls=(0, (4, 3)), zorder=2)
@@ -85,7 +120,13 @@ def draw_depth(figure, motion, cleared, frame, side, path):
     axes.plot(*np.array([shoulder, wrist]).T, "s", color=INK, ms=5, zorder=6)
     e = centre - prisms.radius * out
     t = e + depth * out
-    axes.annotate("", t, e, arrowprops={"arrowstyle": "<->", "color": INK, "lw": 1.3}, zorder=7)
+    axes.annotate(
+        "",
+        t,
+        e,
+        arrowprops={"arrowstyle": "<->", "color": INK, "lw": 1.3, "shrinkA": 0, "shrinkB": 0},
+        zorder=7,
+    )
     beside = np.array([-out[1], out[0]])
     words = (
         (e, "$p_e$", -0.014 * out),
@@ -111,8 +152,8 @@ def draw_depth(figure, motion, cleared, frame, side, path):
     plt.close(figure_)
 
 
-def draw_pair(figure, motions, frame, yaw):
-    """A frame without and with avoidance, as bodies."""
+def draw_pair(figure, motions, frame, side, yaw):
+    """A frame without and with avoidance, as bodies; the depth is drawn over the first."""
     surface = Surface(figure.shape, paint(figure, figure.shape))
     actors = [Actor(figure, motion, surface) for motion in motions]
     bodies = [actor.place(frame) for actor in actors]
@@ -120,7 +161,11 @@ def draw_pair(figure, motions, frame, yaw):
     points = points[points[:, 1] > points[:, 1].max() - 1.0]
     camera = Camera.framing(points, yaw, np.radians(10.0), (480, 560))
     ground = Ground.seen(camera, float(bodies[0].vertices[:, 1].min()), points.mean(axis=0))
-    return [take_picture([body], camera, ground) for body in bodies]
+    before, after = (take_picture([body], camera, ground) for body in bodies)
+    depth, p_e, p_t = find_deepest(figure, motions[0], frame, side)
+    out = np.subtract(p_t, p_e) / np.linalg.norm(np.subtract(p_t, p_e))
+    deep = np.array(p_e) - build_prisms(figure).radius * out
+    return [mark_depth(before, camera, [deep, deep + depth * out]), after]
 
 
 def main() -> None:
@@ -140,7 +185,7 @@ def main() -> None:
         frame, side = np.unravel_index(both.argmax(), both.shape)
         print(method, "frame", frame, "side", side, "depth", depths[0][frame, side], depths[1][frame, side])
         yaw = 0.6 if side == 0 else -0.6
-        pictures += draw_pair(figure, motions, frame, yaw)
+        pictures += draw_pair(figure, motions, frame, int(side), yaw)
         labels += [f"{method}: {1e3 * depths[0][frame, side]:.0f} mm deep", f'{method}, avoid="elbows"']
         if method == "sik":
             frame, side = np.unravel_index(np.abs(both - SHOWN).argmin(), both.shape)

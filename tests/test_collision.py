@@ -14,6 +14,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import sixpoint as sp
+from conftest import recordings
 from sixpoint.body import rotations as rot
 from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.surface.prisms import DIRECTIONS, Prisms, _prism, build_prisms, directions
@@ -132,6 +133,47 @@ def test_prisms_enclose_the_trunk(figure):
     assert np.quantile(gaps, 0.02) > -2.0 * prisms.radius  # and not by much more
 
 
+def test_a_root_on_the_floor_moves_no_outline(figure):
+    """A rig whose pelvis hangs on a root on the floor has the outlines of the same rig without."""
+    bare = sp.Figure.from_stature(1.75).skeleton
+    offsets = np.vstack([[[0.0, 0.0, 0.0], [0.1, 0.95, -0.2]], bare.offsets[1:]])
+    below = sp.Skeleton(("floor", *bare.names), [-1, *(p + 1 for p in bare.parents)], offsets)
+    other = sp.Figure.from_skeleton(below)
+    other = other.with_shape(build_shape(other))
+    for one, two in zip(build_prisms(figure).prisms, build_prisms(other).prisms, strict=True):
+        assert two.joint == one.joint + 1
+        assert np.allclose(two.heights, one.heights, atol=5e-3)
+        assert np.median(np.abs(two.radii - one.radii)) < 5e-3
+
+
+def test_hands_have_balls_where_the_mesh_has_thumb_and_fingers(figure):
+    """Two across the palm, two across the fingers; the thumb's edge is the farther one."""
+    wrist, *hand = build_prisms(figure).forearm[2:]
+    assert wrist.share == 1.0 and wrist.beside == 0.0 and len(hand) == 4
+    for low, high in (hand[:2], hand[2:]):
+        assert low.share == high.share > 1.0 and low.radius == high.radius > 0.01
+        assert high.beside + high.radius > abs(low.beside - low.radius) and high.beside > low.beside
+
+
+@pytest.mark.parametrize("path", recordings("bandai/*punch*.bvh"))
+def test_elbows_of_a_recording_leave_its_trunk(path):
+    """A recorded boxer on a rig with a root on the floor: elbows that were in the trunk's mesh are out."""
+    pytest.importorskip("trimesh")
+    pytest.importorskip("rtree")
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+    from collision_meter import Meter
+
+    motion = sp.load(path)
+    boxer = sp.Figure.from_motion(motion)
+    boxer = boxer.with_shape(build_shape(boxer))
+    targets = boxer.targets(motion).sliced(slice(0, 120, 4))
+    plain, clear = (sp.SequentialIKPlus(boxer, avoid=a).solve_frames(targets) for a in ((), "elbows"))
+    before, after = (Meter(boxer).measure(found.motion).max(axis=1) > 0.005 for found in (plain, clear))
+    assert before.sum() >= 10 and after.sum() <= 0.05 * before.sum()
+    met = plain.residual[:, 2:4] < 1e-3
+    assert (clear.residual[:, 2:4][met] < 1e-3).mean() >= 0.99
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_off_changes_no_bit(figure, method):
     """Nothing avoided, and nothing in the way, are the same bits."""
@@ -171,8 +213,8 @@ def test_no_elbow_is_in_the_trunk(figure, method):
 def test_a_mirrored_reach_is_posed_as_the_mirror_image(method, avoid):
     """Left and right are treated alike.
 
-    With forearms the first and last frames have no free angle, and the least depth is flat there: rounding
-    moves it by millimetres.
+    With forearms the first and last frames have no free angle, and the least depth is flat there; a turn of
+    a clavicle is found to a third of a degree. Rounding moves both by millimetres.
     """
     inner = slice(10, 50) if "forearms" in avoid else slice(None)
     figure = sp.Figure.from_stature(1.75)
@@ -182,7 +224,7 @@ def test_a_mirrored_reach_is_posed_as_the_mirror_image(method, avoid):
     one, two = (solver.solve_motion(t).positions for t in (targets, other))
     roles = figure.roles
     for a, b in ((roles.elbow, roles.elbow[::-1]), (roles.wrist, roles.wrist[::-1])):
-        assert np.allclose(one[inner, a] * MIRROR, two[inner, b], atol=2e-4)
+        assert np.allclose(one[inner, a] * MIRROR, two[inner, b], atol=5e-3 if "forearms" in avoid else 2e-4)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -9,27 +9,36 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.anthropometry import MEAN_STATURE
 from sixpoint.body.figure import Figure
+from sixpoint.body.stature import stature_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-HEIGHT = 1.6  # Figure.height for which lengths are given [m]
 SPACING = 0.012  # m, between points of a surface
 TRUNK, NECK, HEAD, UPPER, LOWER, HAND, THIGH, SHANK, FOOT = range(9)
 SHARE = 0.995  # of the vertices around a bone that its radius encloses
 
 # A trunk without a shape, from the hips (0) over the waist to the shoulders (1): half widths and half depth
-# of elliptic cylinders as shares of the figure's height; at the shoulders about 3/4 of half their width.
+# of elliptic cylinders as shares of the stature; at the shoulders about 3/4 of half their width.
 HEIGHTS = (0.0, 0.45, 0.8, 1.0)
 WIDTHS = (0.09, 0.075, 0.09, 0.09)
 DEPTH = 0.06
-ELBOW = 0.045  # m, radius of an elbow without a shape, for a height of 1.6 m
+ELBOW = 0.045  # m, radius of an elbow without a shape, for the mean stature
 ARM_RADII = ((UPPER, 0.043), (LOWER, 0.038), (HAND, 0.035))  # m, likewise
-THIGH_RADII = (0.092, 0.06)  # at hip and knee, for a height of 1.6 m [m]
+THIGH_RADII = (0.092, 0.06)  # at hip and knee, likewise [m]
+WRIST, PALM = 0.026, 0.02  # m, radius of a wrist, and half the thickness of a hand, likewise
+# Across a hand: how far beyond the wrist, and its edges from the line of the forearm, the thumb's last [m].
+HAND_EDGES = ((0.075, -0.03, 0.085), (0.145, -0.012, 0.064))
 ENCLOSED = 0.9  # of the vertices of a thigh that its radii enclose
 NEAR_HIP = 0.25  # share of a thigh above which another one cannot be kept away: hips stand still
 BESIDE = 2e-3  # m, half of the least gap between neutral thighs
+
+
+def unit_of(figure: Figure) -> float:
+    """How many times as tall as the mean a figure is, for which lengths here are given."""
+    return stature_of(figure) / MEAN_STATURE
 
 
 def parts_of_joints(figure: Figure) -> Index:
@@ -65,7 +74,8 @@ def neutral_surface(figure: Figure) -> tuple[Array, Index]:
     shape = figure.shape
     assert shape is not None
     positions, world = figure.neutral_pose.compute_transforms()
-    vertices = shape.place(positions, world) - positions[0] + figure.rest_positions[0]
+    pelvis = figure.roles.pelvis  # a root above it stands still, while a pose may have the pelvis anywhere
+    vertices = shape.place(positions, world) - positions[pelvis] + figure.rest_positions[pelvis]
     carrier = shape.joints[np.arange(len(vertices)), shape.weights.argmax(axis=1)]
     return vertices, parts_of_joints(figure)[carrier]
 
@@ -102,7 +112,7 @@ def spread_points(vertices: Array, triangles: Index) -> Array:
 def bare_trunk(figure: Figure, head: bool) -> Array:
     """Points of elliptic cylinders in place of a trunk, and of a ball for a head [m]."""
     roles, rest = figure.roles, figure.rest_positions
-    unit = figure.height / HEIGHT
+    unit, stature = unit_of(figure), stature_of(figure)
     hips, shoulders = rest[list(roles.hip)], rest[list(roles.shoulder)]
     low, high = hips[:, 1].mean() - 0.05 * unit, shoulders[:, 1].mean() + 0.03 * unit
     middle = np.array([hips.mean(axis=0), shoulders.mean(axis=0)])
@@ -110,7 +120,7 @@ def bare_trunk(figure: Figure, head: bool) -> Array:
     rings = []
     for y in np.arange(low, high + SPACING, SPACING):
         t = (min(y, high) - low) / (high - low)
-        width, depth = np.interp(t, HEIGHTS, WIDTHS) * figure.height, DEPTH * figure.height
+        width, depth = np.interp(t, HEIGHTS, WIDTHS) * stature, DEPTH * stature
         centre = middle[0] + t * (middle[1] - middle[0])
         x, z = centre[0] + width * np.cos(angles), centre[2] + depth * np.sin(angles)
         rings.append(np.column_stack([x, np.full_like(x, min(y, high)), z]))
@@ -144,7 +154,7 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
         half: How far to both sides to look [m].
         forearm: On the line from elbow to wrist; else on that from elbow to shoulder.
     """
-    roles, unit = figure.roles, figure.height / HEIGHT
+    roles, unit = figure.roles, unit_of(figure)
     lower = float(np.linalg.norm(figure.offset_between(roles.elbow[0], roles.wrist[0])))
     part = (LOWER if along <= lower else HAND) if forearm else UPPER
     bare = (ELBOW if forearm and along == 0.0 else dict(ARM_RADII)[part]) * unit
@@ -165,13 +175,42 @@ def arm_radius(figure: Figure, reach: float, along: float, half: float, *, forea
     return widest if 0.0 < widest < 3.0 * bare else bare
 
 
+def hand_balls(figure: Figure) -> list[tuple[float, float, float]]:
+    """Balls of a hand that goes straight on from the forearm: the wrist, then two across palm and fingers.
+
+    Each is how far beyond the wrist and how far beside its line, to the thumb's side, and its radius [m].
+    They lie at both edges of the hand's flesh and are as thick as that, the mean of both hands.
+    """
+    unit, roles = unit_of(figure), figure.roles
+    found = [(0.0, 0.0, WRIST * unit)]
+    flat = []
+    if figure.shape is not None:
+        vertices, parts = neutral_surface(figure)
+        for k in range(2):
+            elbow, wrist = (figure.rest_positions[j[k]] for j in (roles.elbow, roles.wrist))
+            hand = vertices[parts == HAND + 16 * k] - wrist
+            along = (wrist - elbow) / max(float(np.linalg.norm(wrist - elbow)), 1e-9)
+            flat.append(np.column_stack([hand @ along, np.abs(hand[:, 0]), hand[:, 2]]))
+    for beyond, low, high in HAND_EDGES:
+        edges, radius = np.array([low, high]) * unit, PALM * unit
+        near = [f[np.abs(f[:, 0] - beyond * unit) < 0.02 * unit] for f in flat]
+        if near and all(len(f) >= 8 for f in near):
+            edges = np.mean([[f[:, 2].min(), f[:, 2].max()] for f in near], axis=0)
+            radius = float(np.clip(np.mean([f[:, 1].max() for f in near]), 0.5 * radius, 1.5 * radius))
+        found += [
+            (beyond * unit, float(edges[0]) + radius, radius),
+            (beyond * unit, float(edges[1]) - radius, radius),
+        ]
+    return found
+
+
 def thigh_radii(figure: Figure) -> tuple[float, float]:
     """Radii of the thighs at hip and knee [m]: a straight course that encloses most of both thighs' flesh.
 
     Thighs that touch in the neutral pose are narrower here, by half of what they would share a quarter of
     their length below the hips or at the knees: else they could never be beside each other.
     """
-    roles, rest, unit = figure.roles, figure.rest_positions, figure.height / HEIGHT
+    roles, rest, unit = figure.roles, figure.rest_positions, unit_of(figure)
     radii = np.array(THIGH_RADII) * unit
     if figure.shape is not None:
         vertices, parts = neutral_surface(figure)

@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.surface.flesh_regions import arm_radius, bare_trunk, trunk_points
+from sixpoint.body.surface.flesh_regions import (
+    arm_radius,
+    bare_trunk,
+    hand_balls,
+    trunk_points,
+    unit_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,9 +30,8 @@ DIRECTIONS = 32
 SLICES = 7
 OVERLAP = 0.02  # m, by which prisms of bent neighbours run into each other
 LEAST = 1e-3  # m, least radius of an outline
-REGION = 0.08  # of an elbow: so far along upper arm and forearm, for a height of 1.6 m [m]
-FOREARM_SHARES = (0.55, 0.8, 1.0, 1.3)  # places on the line elbow-wrist; the last is in the hand
-HEIGHT = 1.6  # Figure.height for which lengths are given [m]
+REGION = 0.08  # of an elbow: so far along upper arm and forearm, for the mean stature [m]
+FOREARM_SHARES = (0.55, 0.8)  # places on the line elbow-wrist
 
 
 def directions() -> Array:
@@ -68,11 +73,13 @@ class Ball:
         forearm: Whether it lies on the line from elbow to wrist, else on that from elbow to shoulder.
         share: Where on it: 0 the elbow, 1 the other end.
         radius: [m].
+        beside: How far beside the line, to where the elbow folds [m].
     """
 
     forearm: bool
     share: float
     radius: float
+    beside: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +113,7 @@ def build_prisms(figure: Figure, chain: SpineChain | None = None, *, head: bool 
         head: Whether neck and head have prisms too.
     """
     chain = chain or figure.spine_chain
-    unit = figure.height / HEIGHT
+    unit = unit_of(figure)
     radius = arm_radius(figure, REGION * unit, 0.0, 0.5 * REGION * unit, forearm=True)
     points = trunk_points(figure, head) if figure.shape is not None else bare_trunk(figure, head)
     prisms = []
@@ -146,7 +153,8 @@ def _balls(figure: Figure, unit: float, radius: float) -> tuple[tuple[Ball, ...]
         ball(False, min(0.75 * REGION * unit / upper, 1.0)),
         ball(True, min(0.75 * REGION * unit / lower, 1.0)),
     )
-    return elbow, tuple(ball(True, share) for share in FOREARM_SHARES)
+    hand = [Ball(True, 1.0 + beyond / lower, found, beside) for beyond, beside, found in hand_balls(figure)]
+    return elbow, (*(ball(True, share) for share in FOREARM_SHARES), *hand)
 
 
 def _prism(joint: int, points: Array, high: float, low: float, radius: float) -> Prism:

@@ -18,7 +18,7 @@ from sixpoint.solvers.avoidance.packing import (
     SLICES,
     SPREAD,
 )
-from sixpoint.solvers.avoidance.thigh_clearance import beside_thighs, or_in_thighs
+from sixpoint.solvers.avoidance.thigh_clearance import beside_thighs, fold_of, or_in_thighs
 
 OUTSIDE = 1.0  # m, how far is said of what is beside or above all prisms
 LAST = 32.0 - 1e-9
@@ -85,6 +85,7 @@ def gap_of_arm(flesh, root, world, segs, shoulder, elbow, wrist):
         wrist_gap = min(gap_to_trunk(flesh, root, world, segs, wrist), 0.0)
     least, place = OUTSIDE, root
     up, down = vec.sub(shoulder, elbow), vec.sub(wrist, elbow)
+    fold = fold_of(up, down) if count > 3 else down
     for k in range(flesh.prisms.shape[0]):
         row, q = flesh.prisms[k], qt.load(world, k)
         p = qt.inv_mul_vec(q, vec.sub(elbow, place))
@@ -96,7 +97,10 @@ def gap_of_arm(flesh, root, world, segs, shoulder, elbow, wrist):
         for i in range(count):
             b = FIRST_BALL + BALL * i
             forearm, share = flesh.arms[b] > 0.0, flesh.arms[b + 1]
-            gap = gap_to_prism(row, vec.madd(p, share, below if forearm else above)) + flesh.arms[b + 2]
+            ball = vec.madd(p, share, below if forearm else above)
+            if flesh.arms[b + 3] != 0.0:
+                ball = vec.madd(ball, flesh.arms[b + 3], qt.inv_mul_vec(q, fold))
+            gap = gap_to_prism(row, ball) + flesh.arms[b + 2]
             if forearm:
                 gap -= share * wrist_gap
             least = min(least, gap)
@@ -151,6 +155,7 @@ def deepest(flesh, root, world, segs, shoulder, elbow, wrist):
     most, smaller, place = 0.0, 0.0, root
     prism, centre, turn, origin = -1, elbow, qt.IDENTITY, root
     up, down = vec.sub(shoulder, elbow), vec.sub(wrist, elbow)
+    fold = fold_of(up, down) if count > 3 else down
     for k in range(flesh.prisms.shape[0]):
         row, q = flesh.prisms[k], qt.load(world, k)
         p = qt.inv_mul_vec(q, vec.sub(elbow, place))
@@ -162,6 +167,8 @@ def deepest(flesh, root, world, segs, shoulder, elbow, wrist):
         for i in range(count):
             b = FIRST_BALL + BALL * i
             ball = vec.madd(p, flesh.arms[b + 1], below if flesh.arms[b] > 0.0 else above)
+            if flesh.arms[b + 3] != 0.0:
+                ball = vec.madd(ball, flesh.arms[b + 3], qt.inv_mul_vec(q, fold))
             depth = -gap_to_prism(row, ball) - flesh.arms[b + 2]
             if depth > most:
                 most, smaller, prism, centre, turn, origin = depth, flesh.arms[b + 2], k, ball, q, here

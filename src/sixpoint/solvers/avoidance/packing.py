@@ -4,11 +4,12 @@ A prism's row: x and z of its centre line, least and largest height, largest rad
 the grown outlines (7, 33) as |x| + |z| of their points, see ``body.prisms.directions``; the last point is the
 first. The arms' row: number of balls, how far
 from the elbow the farthest is [m], then per ball 1 for the line elbow-wrist or 0 for elbow-shoulder, the
-share of it, and by how much the ball is smaller than the radius by which outlines are grown [m].
+share of it, by how much the ball is smaller than the radius by which outlines are grown, and how far it is
+beside the line, to where the elbow folds [m].
 
 Thighs cross in a second array of rows of four, or as None where nothing stays out of them: radius at hip and
 knee [m], number of the arms' balls, and 1 if thighs stay out of each other; how far from the elbow the
-farthest ball is [m], and the radius at the wrist [m]; then per ball as above, with its radius [m].
+farthest ball is [m], and the radius at the wrist [m]; then per ball as above, with its radius.
 """
 
 from typing import NamedTuple
@@ -23,10 +24,10 @@ assert (DIRECTIONS, SLICES) == (outlines.DIRECTIONS, outlines.SLICES)
 HEADER = 6
 RING = DIRECTIONS + 1
 WIDTH = HEADER + SLICES * RING
-BALL = 3
+BALL = 4
 SPREAD, FIRST_BALL = 1, 2
 THIGH_HEADER = 2
-PALM = 0.02  # m, half of a hand that lies flat on a thigh, as hands mostly do
+PALM = 0.02  # m, most of a hand beside a thigh: they touch where a body just stands
 
 
 class Flesh(NamedTuple):
@@ -63,8 +64,8 @@ def pack_flesh(prisms, lengths, forearms):
         row[:HEADER] = *prism.centre, low, high, prism.grown.max(), (SLICES - 1) / max(high - low, 1e-9)
         row[HEADER:] = np.pad(prism.grown * norm, ((0, 0), (0, 1)), mode="wrap").ravel()
     balls = [*prisms.elbow, *(prisms.forearm if forearms else ())]
-    table[-1, :FIRST_BALL] = len(balls), max(ball.share * lengths[ball.forearm] for ball in balls)
-    numbers = [(ball.forearm, ball.share, prisms.radius - ball.radius) for ball in balls]
+    table[-1, :FIRST_BALL] = len(balls), _spread(balls, lengths)
+    numbers = [(ball.forearm, ball.share, prisms.radius - ball.radius, ball.beside) for ball in balls]
     table[-1, FIRST_BALL : FIRST_BALL + BALL * len(balls)] = np.ravel(numbers)
     return table
 
@@ -82,11 +83,16 @@ def pack_thighs(radii, balls, lengths, apart):
     table[0] = *radii, len(balls), apart
     if balls:
         wrist = min((b for b in balls if b.forearm), key=lambda ball: abs(ball.share - 1.0))
-        table[1, :2] = max(ball.share * lengths[ball.forearm] for ball in balls), min(wrist.radius, PALM)
-        table[THIGH_HEADER:, :3] = [
-            (b.forearm, b.share, min(b.radius, PALM) if b.share >= 1.0 else b.radius) for b in balls
+        table[1, :2] = _spread(balls, lengths), wrist.radius
+        table[THIGH_HEADER:] = [
+            (b.forearm, b.share, min(b.radius, PALM) if b.share > 1.0 else b.radius, b.beside) for b in balls
         ]
     return table
+
+
+def _spread(balls, lengths):
+    """How far from the elbow the farthest ball is [m]."""
+    return max(np.hypot(ball.share * lengths[ball.forearm], ball.beside) for ball in balls)
 
 
 @helper

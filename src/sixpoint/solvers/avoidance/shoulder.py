@@ -11,9 +11,10 @@ from sixpoint.kernels.jit import helper
 from sixpoint.kernels.swing_twist import clamp
 
 MOST = 0.35  # rad, of a clavicle
+TILT = 1.5  # of its turn about itself: backward where it goes forward, as when an arm is raised
 SPEED = 6.0  # rad/s
 GAIN = 1e-4  # m, less is no way out
-TRIES = 5  # of finding the least angle that frees the arm
+TRIES = 3  # of finding the least angle that frees the arm
 CLOSE = 5e-3  # rad, an angle so near to the least one is it
 
 
@@ -25,7 +26,9 @@ def draw_clavicle(model, limits, limb, angle, base, world, frame, place):
     """
     row = model.segments.shape[0] + limb
     chest, bone = qt.load(world, model.chest[limb]), vec.load(model.clavicles, limb)
-    turned = qt.mul(base, qt.from_axis_angle((0.0, 1.0, 0.0), angle))
+    tilt = TILT * angle if limb == 0 else -TILT * angle
+    turn = qt.mul(qt.from_axis_angle((0.0, 1.0, 0.0), angle), qt.from_axis_angle((1.0, 0.0, 0.0), tilt))
+    turned = qt.mul(base, turn)
     if limits:
         turned, _ = clamp(model.balls, row, turned)
     joint = vec.sub(place, qt.mul_vec(frame, bone))

@@ -7,7 +7,7 @@ from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.packing import THIGH_HEADER
 
 FIRST = 0.25  # as ``body.flesh_regions.NEAR_HIP``; written out, see ``packing``
-BELOW_HIP = 0.15  # the same for arms: nearer to the hip flesh is rounder than a capsule
+BELOW_HIP = 0.25  # the same for arms: nearer to the hip flesh is rounder than a capsule
 ROUNDS = 3  # of finding the nearest points of two capsules
 WIDEST = 4.0  # m, beyond any gap
 
@@ -60,6 +60,17 @@ def gap_of_thighs(placed, hip_radius, knee_radius):
 
 
 @helper
+def fold_of(up, down):
+    """Unit vector across a forearm, to where its elbow folds; zero where the arm is straight.
+
+    ``up`` and ``down`` lead from the elbow to shoulder and wrist.
+    """
+    off = vec.reject(up, vec.unit(down))
+    length = vec.norm(off)
+    return vec.scale(1.0 / length, off) if length > 1e-6 else (0.0, 0.0, 0.0)
+
+
+@helper
 def is_far(thighs, placed, side, elbow):
     """Whether all of an arm is beside a thigh."""
     hip, knee = vec.load(placed, 2 * side), vec.load(placed, 2 * side + 1)
@@ -89,7 +100,7 @@ def beside_thighs(thighs, placed, elbow, up, down, gap):
 
 @helper
 def gap_to_thighs(thighs, placed, elbow, up, down, gap):
-    count = int(thighs[0, 2])
+    count, fold = int(thighs[0, 2]), fold_of(up, down)
     for side in range(2 if count > 0 else 0):
         if is_far(thighs, placed, side, elbow):
             continue
@@ -98,7 +109,7 @@ def gap_to_thighs(thighs, placed, elbow, up, down, gap):
         for i in range(count):
             ball = thighs[THIGH_HEADER + i]
             forearm = ball[0] > 0.0
-            p = vec.madd(elbow, ball[1], down if forearm else up)
+            p = vec.madd(vec.madd(elbow, ball[1], down if forearm else up), ball[3], fold)
             _, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, p)
             off -= ball[2]
             if forearm:
@@ -118,14 +129,14 @@ def or_in_thighs(thighs, placed, elbow, up, down, found):
 @helper
 def deepest_in_thighs(thighs, placed, elbow, up, down, found):
     most, p_e, p_t = found
-    count = int(thighs[0, 2])
+    count, fold = int(thighs[0, 2]), fold_of(up, down)
     for side in range(2 if count > 0 else 0):
         if is_far(thighs, placed, side, elbow):
             continue
         hip, knee = vec.load(placed, 2 * side), vec.load(placed, 2 * side + 1)
         for i in range(count):
             ball = thighs[THIGH_HEADER + i]
-            p = vec.madd(elbow, ball[1], down if ball[0] > 0.0 else up)
+            p = vec.madd(vec.madd(elbow, ball[1], down if ball[0] > 0.0 else up), ball[3], fold)
             share, off = place_on(hip, knee, thighs[0, 0], thighs[0, 1], BELOW_HIP, p)
             if ball[2] - off > most:
                 most = ball[2] - off

@@ -10,14 +10,13 @@ from math import atan2, pi
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper, specialised
-from sixpoint.solvers.avoidance.elbow import (
+from sixpoint.solvers.avoidance.elbow import MET, STRAIGHT
+from sixpoint.solvers.avoidance.swivel import (
     ENOUGH,
     GROWTH,
     LARGEST_STEP,
     LEAST_STEP,
-    MET,
     REFINEMENTS,
-    STRAIGHT,
     TOUCH,
     elbow_on,
     make_arm,

@@ -8,7 +8,8 @@ from math import atan2, cos, pi, sin
 from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import entry, helper, specialised
-from sixpoint.solvers.avoidance.elbow import clear_arm, make_arm
+from sixpoint.solvers.avoidance.elbow import clear_arm
+from sixpoint.solvers.avoidance.swivel import make_arm
 from sixpoint.solvers.avoidance.thighs import part_thighs
 from sixpoint.solvers.sequential import spine
 from sixpoint.solvers.sequential.clavicle import solve_clavicle

@@ -6,8 +6,9 @@ from sixpoint.kernels import quaternion as qt
 from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.clearance import gap_of_arm
-from sixpoint.solvers.avoidance.elbow import MET, clear_arm_steadily, make_arm
+from sixpoint.solvers.avoidance.elbow import MET, clear_arm_steadily
 from sixpoint.solvers.avoidance.shoulder import CLOSE, GAIN, TRIES, angle_range, draw_clavicle
+from sixpoint.solvers.avoidance.swivel import make_arm
 from sixpoint.solvers.avoidance.thighs import part_thighs, remember_knee
 from sixpoint.solvers.sequential_plus.limbs import arm_pole, leg_pole, solve_by_pole
 from sixpoint.solvers.sequential_plus.measured import is_measured, pole_of_end, turn_end
