@@ -16,6 +16,7 @@ ACCELERATION = 400.0  # what a prediction may miss by half of this times the squ
 DRIFT = 3.0  # speed at which a segment without markers leaves its prediction [m/s]
 WANDER = 0.05  # the same of a lost marker on a segment that is seen [m/s]
 PATIENCE = 0.25  # a refused marker that has no better neighbours is believed after this time [s]
+HOPELESS = 0.5  # but never where it is farther off than this [m]
 MOST = 0.4  # share of refused markers from which on all are believed
 RETURNING = 0.2  # a segment that is back may move to where it is for so long [s]
 AWAY = 2.0  # how far it may be meanwhile [m]
@@ -122,7 +123,7 @@ def exchange(w, table, numbers, memory, flags, goal, ahead):
 
 
 @helper
-def readmit(segments, memory, flags, s, dt):
+def readmit(segments, memory, flags, ahead, s, dt):
     """A segment most of whose markers are refused is where they are; patience with a stubborn one ends."""
     first, count = segments[s, tp.FIRST], segments[s, tp.COUNT]
     used, refused = 0, 0
@@ -137,9 +138,10 @@ def readmit(segments, memory, flags, s, dt):
     if refused == 0:
         return
     for i in range(first, first + count):
-        if flags[i] == tp.REJECTED and (
-            (refused > used and refused >= 3) or (used < 2 and memory[i, tp.REFUSED] > PATIENCE)
-        ):
+        if flags[i] != tp.REJECTED:
+            continue
+        patient = memory[i, tp.REFUSED] > PATIENCE and vec.norm(vec.load(ahead, i)) < HOPELESS
+        if (refused > used and refused >= 3) or (used < 2 and patient):
             flags[i] = tp.USED
 
 
@@ -235,7 +237,7 @@ def screen(m, w, table, segments, numbers, memory, flags, goal, ahead, speed, op
     elif refused > 1:
         exchange(w, table, numbers, memory, flags, goal, ahead)
     for s in range(len(segments)):
-        readmit(segments, memory, flags, s, options.dt)
+        readmit(segments, memory, flags, ahead, s, options.dt)
     note_returns(m, table, segments, memory, flags, speed, options.dt)
     for s in range(len(segments)):
         trust_distances(segments, memory, flags, s, options.dt)
