@@ -129,8 +129,13 @@ def draw_tracking(
     title: str,
     frames: Sequence[int] | None = None,
 ) -> Canvas:
-    """The body and the markers (F, M, 3) [m] at some frames; those refused are not drawn."""
-    shown = list(frames) if frames is not None else _spread(len(motion))
+    """The body and the markers (F, M, 3) [m] at some frames; those refused are not drawn.
+
+    Without ``frames`` some of those are shown in which half of the most markers ever used are used.
+    """
+    used = np.sum((flags == USED) | (flags == SWAPPED), axis=1)
+    told = np.flatnonzero(2 * used >= used.max())
+    shown = list(frames) if frames is not None else [int(told[k]) for k in _spread(len(told))]
     points = np.where((flags == REFUSED)[..., None], np.nan, markers)
     canvas = film(figure, (motion,), shown, below=0.0, points=points)
     add_heading(canvas, _plain(title, 60), f"{motion.duration:.1f} s at {motion.rate:g} Hz")
