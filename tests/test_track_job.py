@@ -15,12 +15,13 @@ from marker_bodies import walking_markers
 from sixpoint.body.limits import Limits
 from sixpoint.body.markers.recording import Markers
 from sixpoint.cli.app import main
+from sixpoint.cli.batch import parse_job
 from sixpoint.errors import Remark, SixpointError
 from sixpoint.formats import load_shape
 from sixpoint.formats.markers import save_markers
 from sixpoint.jobs.marker_models import load_marker_model, save_marker_model
 from sixpoint.jobs.solving import Solving
-from sixpoint.jobs.track.feet import find_stances, hold_feet
+from sixpoint.jobs.track.feet import _is_still, find_stances, hold_feet
 from sixpoint.jobs.track.job import track
 from sixpoint.jobs.track.options import Following, parse_labels
 from sixpoint.jobs.track.replay import replay
@@ -220,6 +221,13 @@ def test_feet_that_creep_are_not_dragged_back():
     assert stances.mean() > 0.9 and 0.005 < moved_by.max() < 0.0201
 
 
+def test_a_foot_that_turns_slowly_does_not_stand():
+    """An ankle that moves by 0.2 m/s is slow enough for a contact, but nothing that stands."""
+    still = np.zeros((60, 2, 3))
+    creeping = still + 0.2 * np.arange(60)[:, None, None] / 60 * [1.0, 0.0, 0.0]
+    assert _is_still(still, 4).all() and not _is_still(creeping, 4).any()
+
+
 def test_a_choice_of_markers(files, tmp_path):
     """--markers follows these alone; an unknown one is an error that lists the others."""
     names = parse_labels("l_asis, r_asis,l_psis,r_psis,l_heel,l_toe,l_ankle")
@@ -235,6 +243,9 @@ def test_a_shipped_layout_goes_by_its_name(files, tmp_path, capsys, monkeypatch)
 
     monkeypatch.chdir(tmp_path)
     tracking.check({"layout": "markers24"})
+    words = ["walk.c3d", "--layout"]
+    assert parse_job("track", [*words, "markers24"])[1] == {"layout": "markers24"}
+    assert parse_job("track", [*words, "mine.toml"])[1] == {"layout": Path("mine.toml")}  # known by content
     assert main(["track", str(files[0]), "--layout", "markers99"]) == 2
     assert "one that ships: markers24" in capsys.readouterr().err
     save_markers(walking_markers(120), tmp_path / "cmu.c3d")

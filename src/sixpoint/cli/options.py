@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 Skeleton = Annotated[Path | None, Parameter(help="The .asf of an .amc; by default looked for beside it.")]
 Frames = Annotated[
@@ -37,11 +38,22 @@ Mapping = Annotated[
     Path | None,
     Parameter(help='TOML table of roles and joints, for a rig with unusual names: l_hip = "LeftThigh".'),
 ]
+
+
+def read_layout(_type: object, tokens: Sequence[Token]) -> Path | str:
+    """A layout that ships goes by its name, others are files."""
+    from sixpoint.body.markers.roles import SHIPPED_LAYOUTS
+
+    value = tokens[0].value
+    return value if value in SHIPPED_LAYOUTS else Path(value)
+
+
 Layout = Annotated[
-    str | None,
+    Path | str | None,
     Parameter(
+        converter=read_layout,
         help='TOML file that says what the markers\' labels mean (`LASI = "l_asis"`), or `markers24`. '
-        "By default the labels are looked for in the known marker sets."
+        "By default the labels are looked for in the known marker sets.",
     ),
 ]
 LimitsFile = Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from sixpoint.cli.options import Force, Frames, LimitsFile, NoLimits, Rate, Unit
+from sixpoint.cli.options import Force, Frames, Layout, LimitsFile, NoLimits, Rate, Unit
 from sixpoint.cli.screen import Screen
 
 if TYPE_CHECKING:
@@ -39,13 +39,7 @@ def track(
     static: Annotated[
         Path | None, Parameter(help="The same person and markers standing still, to calibrate on.")
     ] = None,
-    layout: Annotated[
-        str | None,
-        Parameter(
-            help='TOML table of labels and roles, for an unusual set: `LKNE = "l_knee_lateral"`; or the name '
-            "of one that ships: markers24."
-        ),
-    ] = None,
+    layout: Layout = None,
     markers: Annotated[
         str | None, Parameter(help="Follow these labels only: LASI,RASI,LKNE; by default all with a role.")
     ] = None,

@@ -62,7 +62,11 @@ class MarkersInfo:
 
 
 def inspect(
-    path: Path, *, reading: Reading | None = None, mapping: Path | None = None, layout: str | None = None
+    path: Path,
+    *,
+    reading: Reading | None = None,
+    mapping: Path | None = None,
+    layout: Path | str | None = None,
 ) -> MotionInfo | TargetsInfo | MarkersInfo:
     """Read a file and find out what it holds.
 

@@ -223,7 +223,7 @@ def _read_layout(layout: Layout) -> tuple[str, bool, dict[str, tuple[str, str]]]
         table, name = dict(layout), "layout"
     elif isinstance(layout, str) and layout in SHIPPED_LAYOUTS:
         table, name = read_shipped(f"layouts/{layout}.toml"), layout
-    elif isinstance(layout, str) and not Path(layout).suffix:
+    elif not Path(layout).suffix and not Path(layout).is_file():
         raise FormatError(
             layout, f"no such layout; give a TOML file, or one that ships: {listed(SHIPPED_LAYOUTS)}"
         )

@@ -66,7 +66,9 @@ def check(options: Mapping[str, Any]) -> None:
         six.check()
     for name in ("model", "static", "layout", "limits"):
         path = options.get(name)
-        if path is not None and path not in SHIPPED_LAYOUTS and not Path(path).is_file():
+        if path is None or (name == "layout" and path in SHIPPED_LAYOUTS):
+            continue
+        if not Path(path).is_file():
             raise SixpointError(f"--{name} {path}: there is no such file")
 
 

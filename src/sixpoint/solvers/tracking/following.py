@@ -15,7 +15,7 @@ from sixpoint.solvers.tracking.start import Beginning
 Array = NDArray[np.float64]
 Report = Callable[[int], None]
 
-CHUNK = 64  # frames between two looks at how it goes
+CHUNK, MOMENT = 64, 0.3  # frames, and time [s], between two looks at how it goes, whichever is less
 FEW = 3  # markers in fewer than these tell no body
 OFF = 0.08  # a body is lost where half of its markers are farther off [m]
 PATIENCE = 0.3  # so long [s]; then the next frame with enough of them is begun with
@@ -33,21 +33,31 @@ class Follower:
     def __init__(self, start: Beginning, engine: TrackingEngine, rest: Array) -> None:
         self._start, self._engine, self._rest = start, engine, rest
 
-    def begin(self, frame: Array, options: tp.Options) -> tuple[Followed, State]:
-        """The pose of a first frame of markers (M, 3) [m]."""
-        return self._start.begin(frame, options)
+    def begin(self, frame: Array, options: tp.Options) -> tuple[Followed, State, float]:
+        """The pose of a first frame of markers (M, 3) [m]; adrift for ever where it tells no body."""
+        out, state = self._start.begin(frame, options)
+        return out, state, 0.0 if count_seen(frame) >= FEW else np.inf
 
     def go_on(
-        self, markers: Array, state: State, adrift: float, options: tp.Options
+        self, markers: Array, state: State, adrift: float, options: tp.Options, ever: int | None = None
     ) -> tuple[Followed, State, float]:
         """Frames (F, M, 3) after a state, which was ``adrift`` for so long [s].
 
         After that long the first frame is also begun with anew, and the better way is taken.
 
+        Args:
+            markers: Positions [m], NaN where a marker is not seen.
+            state: What is known; it is written to.
+            adrift: For how long nothing was followed [s].
+            options: Of the compiled tracker.
+            ever: How many of the markers are seen at all; by default those that have been, or are now.
+
         Returns:
             The frames, the state after them, and how long that is adrift [s].
         """
-        anew = adrift > PATIENCE and is_enough(markers[0])
+        if ever is None:
+            ever = max(int(np.sum(state.markers[:, tp.KNOWN] > 0.0)), count_seen(markers[0]))
+        anew = adrift > PATIENCE and is_enough(markers[0], ever)
         other = self._start.begin(markers[0], options) if anew else None
         out = self._engine.run(markers, self._rest, state, options)
         if other is not None:
@@ -67,7 +77,7 @@ class Follower:
             The frames, and the state after the last frame that has enough markers: where the way back begins.
         """
         first, last = _whole(markers)
-        begun, state = self.begin(markers[first], options)
+        begun, state, _ = self.begin(markers[first], options)
         part, state = self._run(markers[first + 1 : last + 1], state, options, lambda n: progress(first + n))
         parts, turning = [begun] * (first + 1) + [part], state.copy()
         if last + 1 < len(markers):
@@ -96,20 +106,30 @@ class Follower:
     def _run(
         self, markers: Array, state: State, options: tp.Options, progress: Report
     ) -> tuple[Followed, State]:
-        parts, adrift = [], 0.0
-        for start, stop in _spans(markers, options.dt):
-            out, state, adrift = self.go_on(markers[start:stop], state, adrift, options)
+        parts, adrift, ever = [], 0.0, count_ever(markers)
+        for start, stop in _chunks(markers, ever, options.dt):
+            out, state, adrift = self.go_on(markers[start:stop], state, adrift, options, ever)
             parts.append(out)
             progress(stop)
         return (join(parts) if parts else self._engine.run(markers, self._rest, state, options)), state
 
 
-def is_enough(frame: Array) -> bool:
-    """Whether a frame (M, 3) can begin a recording: three markers, of half of those there are."""
-    return int(np.isfinite(frame[:, 0]).sum()) >= max(FEW, len(frame) // 2)
+def count_seen(frame: Array) -> int:
+    """Markers (M, 3) that are there."""
+    return int(np.isfinite(frame[:, 0]).sum())
 
 
-def settle(run: Followed, markers: Array) -> Followed:
+def count_ever(markers: Array) -> int:
+    """Markers that any frame (F, M, 3) has: a recording may lack some of its model's."""
+    return int(np.isfinite(markers[..., 0]).any(axis=0).sum())
+
+
+def is_enough(frame: Array, ever: int) -> bool:
+    """Whether a frame (M, 3) can begin a recording: three markers, of half of those that are ever seen."""
+    return count_seen(frame) >= max(FEW, ever // 2)
+
+
+def mark_waiting(run: Followed, markers: Array) -> Followed:
     """Frames that were not followed, as what they are: markers there are refused."""
     waiting = run.flags == tp.WAITING
     flags = np.where(waiting, np.where(np.isfinite(markers[..., 0]), tp.REJECTED, tp.LOST), run.flags)
@@ -118,23 +138,24 @@ def settle(run: Followed, markers: Array) -> Followed:
 
 def _whole(markers: Array) -> tuple[int, int]:
     """First and last frame with enough markers; the first of all where none has."""
-    frames = [f for f, frame in enumerate(markers) if is_enough(frame)]
+    ever = count_ever(markers)
+    frames = [f for f, frame in enumerate(markers) if is_enough(frame, ever)]
     return (frames[0], frames[-1]) if frames else (0, 0)
 
 
-def _spans(markers: Array, dt: float) -> list[tuple[int, int]]:
+def _chunks(markers: Array, ever: int, dt: float) -> list[tuple[int, int]]:
     """First frame of every chunk, and one past its last; where a body comes back, a chunk begins."""
     few = np.isfinite(markers[..., 0]).sum(axis=1) < FEW
-    away, edges = 0.0, set(range(0, len(markers), CHUNK))
+    size = max(1, min(CHUNK, round(MOMENT / dt)))
+    away, edges = 0, set(range(0, len(markers), size))
     for f, frame in enumerate(markers):
-        if few[f] or (away and not is_enough(frame)):
-            away += dt
+        if few[f] or (away and not is_enough(frame, ever)):
+            away += 1
             continue
-        if away > PATIENCE:
+        if away * dt > PATIENCE:
             edges.add(f)
-        away = 0.0
-    ordered = [*sorted(edges), len(markers)]
-    return list(pairwise(ordered))
+        away = 0
+    return list(pairwise([*sorted(edges), len(markers)]))
 
 
 def _follows(run: Followed) -> NDArray[np.bool_]:

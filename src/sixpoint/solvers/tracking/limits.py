@@ -12,6 +12,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.dofs import Dofs
 from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.widening import widen
+from sixpoint.errors import TargetError
 from sixpoint.solvers.tracking.engine import packing as tp
 from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedMotion
 from sixpoint.solvers.tracking.two_sided import carried_by
@@ -19,13 +20,10 @@ from sixpoint.solvers.tracking.two_sided import carried_by
 Array = NDArray[np.float64]
 
 SEEN = 0.9  # share of the markers on and below a joint that say how it is
-FAR = 2.0  # frames farther off than this times the median's residual say nothing
+POOR = 2.0  # frames farther off than this times the median's residual say nothing
 LEAST = np.radians(1.0)  # what is less is noise [rad]
-WORSE, MORE = (
-    1.1,
-    5e-4,
-)  # limits cost something where markers are off by so many times, and by so much more [m]
-FINE = 60.0  # every so manieth frame is looked at that leaves this rate [Hz]
+WORSE, MORE = 1.1, 5e-4  # limits cost where markers are off by so many times, and so much more [m]
+FINE = 60.0  # frames in between are left out where this rate remains [Hz]
 
 
 def widen_limits(
@@ -48,13 +46,18 @@ def widen_limits(
 
     Returns:
         What may move and how far, and name of a joint -> growth of its limits [rad], the largest first.
+
+    Raises:
+        TargetError: The rate is not positive.
     """
+    if not (np.isfinite(rate) and rate > 0):
+        raise TargetError(f"the frame rate must be positive, got {rate}")
     dofs, step = model.figure.full_dofs(), max(1, int(rate / FINE))
     thin, trackers = markers[::step], [MarkerTracker(model, limits=keep, dofs=dofs) for keep in (True, False)]
 
     def tell(way: int, done: int) -> None:
         if progress:
-            progress((way * len(markers) + done * step) // 2)
+            progress((way * len(markers) + min(done * step, len(markers))) // 2)
 
     kept, free = (
         tracker.solve_frames(thin, rate / step, two_sided=False, progress=partial(tell, k))
@@ -65,7 +68,7 @@ def widen_limits(
     costly = _misses(kept, carries) > WORSE * _misses(free, carries) + MORE
     told = used @ carries > SEEN
     off = np.sqrt(np.sum(free.residual**2 * used, axis=1) / np.maximum(used.sum(axis=1), 1))
-    good = off <= FAR * np.median(off) + 1e-4
+    good = off <= POOR * np.median(off[used.any(axis=1)]) + 1e-4 if used.any() else used.any(axis=1)
     before, after = rot.inv(body.before), rot.inv(body.neutral)
     local = rot.mul(rot.mul(before, free.motion.rotations), after)
     joints, grown = dict(dofs.joints), {}

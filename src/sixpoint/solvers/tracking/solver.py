@@ -22,7 +22,7 @@ from sixpoint.solvers.prioritized.articulation import Articulation
 from sixpoint.solvers.prioritized.full_body import attractor_state
 from sixpoint.solvers.prioritized.tasks import PostureTask
 from sixpoint.solvers.tracking.engine import packing as tp
-from sixpoint.solvers.tracking.following import Follower, settle
+from sixpoint.solvers.tracking.following import Follower, mark_waiting
 from sixpoint.solvers.tracking.model import lower_markers
 from sixpoint.solvers.tracking.priorities import PRIORITIES
 from sixpoint.solvers.tracking.running import State, TrackingEngine
@@ -154,8 +154,7 @@ class MarkerTracker:
         """
         frame = self._checked(np.asarray(markers, float)[None])
         if previous is None:
-            adrift = 0.0
-            out, state = self._follower.begin(frame[0], self._options)
+            out, state, adrift = self._follower.begin(frame[0], self._options)
         else:
             if previous.state.markers.shape != (len(self.names), tp.MEMORY):
                 raise SixpointError("previous is of another model; begin with previous=None")
@@ -200,7 +199,7 @@ class MarkerTracker:
             bound = partial(self._engine.steady, rate=rate, limits=self._options.limits)
             out = blend(self.body, self.model, out, back, markers, self._rest, rate, bound)
         else:
-            out = settle(out, markers)
+            out = mark_waiting(out, markers)
         moving, translations = self.body.place_base(out.rotations, out.positions)
         motion = Motion(self.body.rig, out.rotations, translations, rate, moving, name=name)
         return TrackedMotion(motion, out.residual, out.flags, out.iterations)

@@ -16,7 +16,7 @@ from sixpoint.solvers.tracking.running import Followed, State, TrackingEngine
 
 Array = NDArray[np.float64]
 
-COLD, TIMES_ANEW = 60, 4  # iterations of a first frame, and times that its strays are left out
+COLD, ROUNDS = 60, 4  # iterations of a first frame, and times that its strays are left out
 CAUTIOUS = 0.1  # damping of a first frame, whose steps are large [m]
 POOR = 0.03  # a first frame that is off by more on average is also begun without limits [m]
 STRAY = 0.1  # a marker that is farther than this from its place in a first frame is no one's [m]
@@ -48,16 +48,14 @@ class Beginning:
         Strays that are where another one should be have each other's labels.
         """
         seen, pairs = markers.copy(), []
-        for _ in range(TIMES_ANEW):
+        for _ in range(ROUNDS):
             out, pose = self._begin_with(seen, options)
             strays = refuse_strays(out.residual[0], out.flags[0], options.gate)
             if not strays.any():
                 break
             seen[strays] = np.nan
         if np.isfinite(options.gate):
-            moving, translations = self.body.place_base(out.rotations, out.positions)
-            places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
-            pairs = find_swaps(markers, places[0], np.isnan(seen[:, 0]))
+            pairs = find_swaps(markers, self._places(out), np.isnan(seen[:, 0]))
         if pairs:
             for pair in pairs:
                 seen[pair] = markers[pair[::-1]]
@@ -66,10 +64,18 @@ class Beginning:
         out = self.engine.run(seen[None], self.rest, state, options._replace(dt=1e-6, most=10, posture=0.0))
         state.speed[:] = 0.0
         state.lag[:] = 0.0
-        out.flags[0][np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])] = tp.REJECTED
+        refused = np.isfinite(markers[:, 0]) & np.isnan(seen[:, 0])
+        out.flags[0][refused] = tp.REJECTED
+        out.residual[0][refused] = np.linalg.norm(markers - self._places(out), axis=-1)[refused]
         for pair in pairs:
             out.flags[0][pair] = tp.SWAPPED
         return out, state
+
+    def _places(self, out: Followed) -> Array:
+        """(M, 3) where the model's markers are in the pose of a run's only frame [m]."""
+        moving, translations = self.body.place_base(out.rotations, out.positions)
+        places = self.model.place(*self.body.rig.compute_transforms(out.rotations, translations, moving))
+        return np.asarray(places[0])
 
     def _begin_with(self, seen: Array, options: tp.Options) -> tuple[Followed, Array]:
         """The better one of two ways to the first pose: within human limits first, or without any.
