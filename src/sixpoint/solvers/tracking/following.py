@@ -50,13 +50,15 @@ class Follower:
             state: What is known; it is written to.
             adrift: For how long nothing was followed [s].
             options: Of the compiled tracker.
-            ever: How many of the markers are seen at all; by default those that have been, or are now.
+            ever: How many of the markers are seen at all; by default those that have been, or are now, or a
+                third of all.
 
         Returns:
             The frames, the state after them, and how long that is adrift [s].
         """
         if ever is None:
-            ever = max(int(np.sum(state.markers[:, tp.KNOWN] > 0.0)), count_seen(markers[0]))
+            known = int(np.sum(state.markers[:, tp.KNOWN] > 0.0))
+            ever = max(known, count_seen(markers[0]), markers.shape[1] // 3)
         anew = adrift > PATIENCE and is_enough(markers[0], ever)
         other = self._start.begin(markers[0], options) if anew else None
         out = self._engine.run(markers, self._rest, state, options)
