@@ -181,7 +181,7 @@ def steady_states(
     """Bound the way from frame to frame of states (F, 2 J + 1, 4) in place, as the tracker does.
 
     Joints that are not told (F, J) move by a few centimetres a frame, then catch up. Where nothing tells the
-    base, all goes as it is given: whoever is back elsewhere does not lag.
+    base all goes as it is given, but for what fades: whoever is back elsewhere does not lag.
     """
     m = unpack_model(body, integers)
     joints = len(m.parent)
@@ -190,11 +190,13 @@ def steady_states(
     copy_rows(before, last)
     for f in range(1, len(states)):
         if not told[f, m.base]:
-            copy_rows(states[f], before)
-            copy_rows(states[f], last)
             for row in range(2 * joints + 1):
-                for k in range(4):
-                    lag[row, k] = 0.0
+                fade_row(lag, row, dt)
+            copy_rows(states[f], before)
+            let_go(m, states[f], lag)
+            if limits:
+                hold_hinges(m, states[f])
+            copy_rows(states[f], last)
             continue
         for j in range(joints):
             speed[joints + 1 + j, 3] = TWICE if told[f, j] and told[f - 1, j] else 0.0
