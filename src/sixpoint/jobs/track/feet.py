@@ -14,15 +14,23 @@ from sixpoint.solvers.tracking.priorities import find_parts
 Array = NDArray[np.float64]
 
 STILL, SPAN = 0.01, 0.06  # a foot that stands stays within this [m] so long before and after [s]
+FEW = 3  # markers in a frame with fewer than these tell of nobody
 DRIFT = 0.02  # one that creeps farther than this stands anew [m]
 FADE = 0.06  # time in which a foot goes over from moving to standing, and back [s]
-TIGHT = {"feet": 1e-4}
+TIGHT = {"feet": 0.01}
 """Tolerance that holds feet where their markers are held [m]."""
 
 
-def find_stances(model: MarkerModel, motion: Motion) -> NDArray[np.bool_]:
-    """(F, 2) frames in which the left and the right foot stand flat: ankle and toes rest."""
+def find_stances(
+    model: MarkerModel, motion: Motion, seen: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
+    """(F, 2) frames in which the left and the right foot stand flat: ankle and toes rest.
+
+    ``seen`` (F,) are the frames in which markers tell of the body; in others no foot stands.
+    """
     points = motion.positions[:, _ends(model)]
+    if seen is not None:
+        points = np.where(seen[:, None, None], points, np.nan)
     rest = find_contacts(points, motion.rate) & _is_still(points, max(round(SPAN * motion.rate), 1))
     return np.stack([rest[:, 0] & rest[:, 1], rest[:, 2] & rest[:, 3]], axis=1)
 
@@ -33,7 +41,8 @@ def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array
     Returns:
         The markers, and (F, 2) the frames in which a foot is held.
     """
-    stances, held = find_stances(model, motion), markers.copy()
+    seen = np.isfinite(markers[..., 0]).sum(axis=1) >= FEW
+    stances, held = find_stances(model, motion, seen), markers.copy()
     positions, world = motion.transforms
     neutral = model.place(*model.figure.neutral_pose.compute_transforms())
     places = neutral - model.figure.neutral_pose.compute_transforms()[0][model.figure.roles.pelvis]
