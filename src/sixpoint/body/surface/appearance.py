@@ -17,6 +17,9 @@ Bytes = NDArray[np.uint8]
 _CODES = np.arange(256) / 255.0
 LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
 """Light of the 256 codes of sRGB."""
+_CODE = np.searchsorted(0.5 * (LINEAR[1:] + LINEAR[:-1]), np.arange(65536) / 65535.0).astype(np.uint8)
+"""The nearest code for light in 65535ths."""
+_LINEAR32 = LINEAR.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +44,26 @@ class Texture:
             for row in rows
         )
         return np.asarray(upper * (1 - down) + lower * down)
+
+
+def halved(image: Bytes) -> Bytes:
+    """An image (H, W, 4) at half its width and height, rounded up, with the light of the whole one.
+
+    Pixels count by their opacity, so that what cannot be seen gives no colour to what can.
+    """
+    height, width = image.shape[:2]
+    even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    light = np.zeros((even.shape[0] // 2, even.shape[1] // 2, 3), np.float32)
+    plain, opacity = light.copy(), light[..., :1].copy()
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        part = even[row::2, column::2]
+        seen, colour = part[..., 3:].astype(np.float32), _LINEAR32[part[..., :3]]
+        light += seen * colour
+        plain += colour
+        opacity += seen
+    light = np.where(opacity > 0, light / np.maximum(opacity, 1.0), plain / 4.0)
+    codes = _CODE[np.rint(light * 65535.0).astype(np.int32).clip(0, 65535)]
+    return np.concatenate([codes, np.rint(opacity / 4.0).astype(np.uint8)], axis=2)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
