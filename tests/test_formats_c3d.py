@@ -347,7 +347,7 @@ SPACES = {  # up axis, and the subject before the labels; all are in millimetres
 }
 
 
-@pytest.mark.parametrize("path", recordings("c3d/*.c3d"))
+@pytest.mark.parametrize("path", recordings(*(f"c3d/{name}.c3d" for name in SPACES)))
 def test_real_files_are_what_ezc3d_reads(path):
     """Names, rate, frames, gaps and positions of real recordings, against the independent reader."""
     with warnings.catch_warnings():
