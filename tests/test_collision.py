@@ -155,6 +155,16 @@ def test_hands_have_balls_where_the_mesh_has_thumb_and_fingers(figure):
         assert high.beside + high.radius > abs(low.beside - low.radius) and high.beside > low.beside
 
 
+@pytest.mark.parametrize("stature", [1.2, 1.5, 2.0])
+def test_hands_of_a_body_that_just_stands_are_beside_its_thighs(stature):
+    """Whatever its size."""
+    plain = sp.Figure.from_stature(stature)
+    body = plain.with_shape(build_shape(plain))
+    pose = np.tile(rot.IDENTITY, (1, len(body.skeleton), 1))
+    standing = body.compute_motion(pose, np.zeros((1, 3)), 60.0)
+    assert find_penetration(body, standing, "arms")["arms"].max() == 0.0
+
+
 def test_a_taller_body_has_thicker_hands():
     """Balls of hands and thighs grow with the stature, palms that touch a thigh among them."""
     small, tall = (sp.Figure.from_stature(1.5 * scale) for scale in (1.0, 1.3))
