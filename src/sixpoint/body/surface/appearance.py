@@ -19,7 +19,7 @@ LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) 
 """Light of the 256 codes of sRGB."""
 _CODE = np.searchsorted(0.5 * (LINEAR[1:] + LINEAR[:-1]), np.arange(65536) / 65535.0).astype(np.uint8)
 """The nearest code for light in 65535ths."""
-_LINEAR32 = LINEAR.astype(np.float32)
+_LIGHT = np.rint(LINEAR * 65535.0).astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,19 +51,15 @@ def halved(image: Bytes) -> Bytes:
 
     Pixels count by their opacity, so that what cannot be seen gives no colour to what can.
     """
-    height, width = image.shape[:2]
+    height, width, _ = image.shape
     even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    light = np.zeros((even.shape[0] // 2, even.shape[1] // 2, 3), np.float32)
-    plain, opacity = light.copy(), light[..., :1].copy()
-    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        part = even[row::2, column::2]
-        seen, colour = part[..., 3:].astype(np.float32), _LINEAR32[part[..., :3]]
-        light += seen * colour
-        plain += colour
-        opacity += seen
-    light = np.where(opacity > 0, light / np.maximum(opacity, 1.0), plain / 4.0)
-    codes = _CODE[np.rint(light * 65535.0).astype(np.int32).clip(0, 65535)]
-    return np.concatenate([codes, np.rint(opacity / 4.0).astype(np.uint8)], axis=2)
+    parts = [even[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+    opacity = np.asarray(np.sum([part[..., 3:] for part in parts], axis=0, dtype=np.int64))
+    light = np.asarray(sum(_LIGHT.take(part[..., :3]) for part in parts)) // 4
+    uneven = np.any([part[..., 3] != parts[0][..., 3] for part in parts], axis=0)
+    seen = sum(part[uneven, 3:] * _LIGHT.take(part[uneven, :3]).astype(np.int64) for part in parts)
+    light[uneven] = np.asarray(seen) // opacity[uneven]
+    return np.concatenate([_CODE.take(light), ((opacity + 2) // 4).astype(np.uint8)], axis=2)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
