@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,8 +109,8 @@ def guided(figure, motion, rotations, weights, feet):
     chest = [j for j in r.spine if j in figure.skeleton.path(0, r.shoulder[0])][-1]
     joints, ankles = [chest, *r.elbow, *r.knee], list(r.ankle)
     solver, guidance = sp.SequentialIKPlus(figure, rotations=rotations), Guidance(figure)
-    stature, stood = stature_of(figure), np.percentile(targets.positions[:, 4:, 1], 10)
-    floor = Floor(stature, 0.039 * stature, float(stood) - 0.039 * stature)
+    floor, stood = Floor.under(figure), float(np.percentile(targets.positions[:, 4:, 1], 10))
+    floor = replace(floor, height=stood - floor.ankle)
     solution, rows = None, []
     for k in range(0, len(targets), 4):
         frame = Tracked(

@@ -20,12 +20,12 @@ def data_folder() -> Path | None:
     return folder if folder.is_dir() else None
 
 
-def recordings(pattern: str) -> list[Any]:
-    """Test parameters: paths below the data folder that match; one skipped parameter without it."""
+def recordings(*patterns: str) -> list[Any]:
+    """Test parameters: paths below the data folder that match; one skipped parameter where none does."""
     folder = data_folder()
-    found = sorted(folder.glob(pattern)) if folder else []
+    found = sorted({path for pattern in patterns for path in folder.glob(pattern)}) if folder else []
     if not found:
-        reason = f"no recordings {pattern} in $SIXPOINT_DATA or ../shared/data"
+        reason = f"no recordings {', '.join(patterns)} in $SIXPOINT_DATA or ../shared/data"
         return [pytest.param(None, marks=pytest.mark.skip(reason=reason), id="no-data")]
     return [pytest.param(path, id=str(path.relative_to(folder))) for path in found if folder]
 

@@ -119,6 +119,38 @@ def test_a_command_line_begins_without_the_library():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        *(f"import sixpoint as sp; sp.{name}.__name__" for name in ("body", "errors", "formats", "solvers")),
+        "import sixpoint as sp; found = sp.Figure; assert sp.body.figure.Figure is found",
+        "from sixpoint import *; import sixpoint.api as api; assert set(api.__all__) <= set(globals())",
+    ],
+)
+def test_what_is_asked_of_the_package_is_there_the_first_time(code):
+    """Its submodules, its names, and all of them at once."""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "from sixpoint import cli; cli.main",
+        "import sixpoint; sixpoint.errors.FigureError",
+        "import sixpoint; assert not any(hasattr(sixpoint, n) for n in ('__wrapped__', '_body', 'a.b', ''))",
+    ],
+)
+def test_a_part_or_a_question_does_not_load_the_library(code):
+    """Neither a light submodule nor what tools look for in any module."""
+    light = "; import sys; assert not {'numba', 'sixpoint.api'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code + light], check=True)
+
+
+def test_types_are_for_users_too():
+    """The marker of PEP 561 is in the package."""
+    assert (PACKAGE / "py.typed").is_file()
+
+
 def test_files_stay_small():
     """No source file grows beyond 350 lines."""
     long = {

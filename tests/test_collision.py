@@ -20,7 +20,7 @@ from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.surface.prisms import DIRECTIONS, Prisms, _prism, build_prisms, directions
 from sixpoint.errors import SixpointError
 from sixpoint.solvers.avoidance.clearance import deepest, gap_to_prism
-from sixpoint.solvers.avoidance.options import check_avoid
+from sixpoint.solvers.avoidance.options import check_avoid, find_flesh
 from sixpoint.solvers.avoidance.packing import pack_flesh, unpack_flesh
 from sixpoint.solvers.avoidance.penetration import describe_penetration, find_penetration
 from sixpoint.solvers.avoidance.thigh_clearance import gap_of_thighs
@@ -153,6 +153,26 @@ def test_hands_have_balls_where_the_mesh_has_thumb_and_fingers(figure):
     for low, high in (hand[:2], hand[2:]):
         assert low.share == high.share > 1.0 and low.radius == high.radius > 0.01
         assert high.beside + high.radius > abs(low.beside - low.radius) and high.beside > low.beside
+
+
+@pytest.mark.parametrize("stature", [1.2, 1.5, 2.0])
+def test_hands_of_a_body_that_just_stands_are_beside_its_thighs(stature):
+    """Whatever its size."""
+    plain = sp.Figure.from_stature(stature)
+    body = plain.with_shape(build_shape(plain))
+    pose = np.tile(rot.IDENTITY, (1, len(body.skeleton), 1))
+    standing = body.compute_motion(pose, np.zeros((1, 3)), 60.0)
+    assert find_penetration(body, standing, "arms")["arms"].max() == 0.0
+
+
+def test_a_taller_body_has_thicker_hands():
+    """Balls of hands and thighs grow with the stature, palms that touch a thigh among them."""
+    small, tall = (sp.Figure.from_stature(1.5 * scale) for scale in (1.0, 1.3))
+    (_, thighs), (_, grown) = (find_flesh(f, f.spine_chain, ("arms",)) for f in (small, tall))
+    hands = thighs[2:, 1] > 1.0
+    assert hands.sum() == 4
+    np.testing.assert_allclose(grown[2:, 2:], 1.3 * thighs[2:, 2:], rtol=1e-9)
+    np.testing.assert_allclose(grown[0, :2], 1.3 * thighs[0, :2], rtol=1e-9)
 
 
 @pytest.mark.parametrize("path", recordings("bandai/*punch*.bvh"))

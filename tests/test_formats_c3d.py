@@ -347,7 +347,7 @@ SPACES = {  # up axis, and the subject before the labels; all are in millimetres
 }
 
 
-@pytest.mark.parametrize("path", recordings("c3d/*.c3d"))
+@pytest.mark.parametrize("path", recordings(*(f"c3d/{name}.c3d" for name in SPACES)))
 def test_real_files_are_what_ezc3d_reads(path):
     """Names, rate, frames, gaps and positions of real recordings, against the independent reader."""
     with warnings.catch_warnings():
@@ -368,25 +368,29 @@ def test_real_files_are_what_ezc3d_reads(path):
     np.testing.assert_allclose(markers.positions, turned, atol=1e-9)
 
 
-def test_real_residuals_are_the_lower_byte(data):
+RESIDUALS = {  # block of the data, floats or not, points, analog samples per frame, scale and worst [mm]
+    "btk_others_Gait": (11, False, 33, 280, 0.0744075, 3.94),
+    "02_05": (13, True, 41, 0, 0.05, 12.7),
+}
+
+
+@pytest.mark.parametrize("path", recordings(*(f"c3d/{name}.c3d" for name in RESIDUALS)))
+def test_real_residuals_are_the_lower_byte(path):
     """The format's own rule, read without our reader: an integer file of a DEC, a float file of an Intel."""
-    for name, start, floats, points, analogs, scale, worst in (
-        ("btk_others_Gait", 11, False, 33, 280, 0.0744075, 3.94),
-        ("02_05", 13, True, 41, 0, 0.05, 12.7),
-    ):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            markers = load_markers(data / "c3d" / f"{name}.c3d")
-        raw = (data / "c3d" / f"{name}.c3d").read_bytes()[(start - 1) * 512 :]
-        words = np.frombuffer(raw[: len(raw) // 4 * 4], "<f4" if floats else "<i2")
-        width = 4 * points + analogs
-        fourth = words[: len(markers) * width].reshape(-1, width)[:, 3 : 4 * points : 4].astype(int)
-        seen = fourth >= 0
-        np.testing.assert_array_equal(seen, markers.tracked)
-        np.testing.assert_allclose(
-            markers.residuals[seen], (fourth[seen] % 256) * scale * 1e-3, rtol=1e-5, atol=1e-12
-        )
-        assert np.nanmax(markers.residuals) * 1000 == pytest.approx(worst, abs=0.01)
+    start, floats, points, analogs, scale, worst = RESIDUALS[path.stem]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        markers = load_markers(path)
+    raw = path.read_bytes()[(start - 1) * 512 :]
+    words = np.frombuffer(raw[: len(raw) // 4 * 4], "<f4" if floats else "<i2")
+    width = 4 * points + analogs
+    fourth = words[: len(markers) * width].reshape(-1, width)[:, 3 : 4 * points : 4].astype(int)
+    seen = fourth >= 0
+    np.testing.assert_array_equal(seen, markers.tracked)
+    np.testing.assert_allclose(
+        markers.residuals[seen], (fourth[seen] % 256) * scale * 1e-3, rtol=1e-5, atol=1e-12
+    )
+    assert np.nanmax(markers.residuals) * 1000 == pytest.approx(worst, abs=0.01)
 
 
 def test_repeated_labels_are_told_apart_by_their_descriptions(tmp_path):

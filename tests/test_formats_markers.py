@@ -391,7 +391,7 @@ TRC_FILES = {  # markers, frames, rate, unit, height of the highest marker [m], 
 }
 
 
-@pytest.mark.parametrize("path", recordings("trc/*.trc"))
+@pytest.mark.parametrize("path", recordings(*(f"trc/{name}.trc" for name in TRC_FILES)))
 def test_real_trc_files_are_what_a_split_of_their_lines_reads(path):
     """Names, counts, rate and every number of real recordings: metres and millimetres, Y up."""
     markers = load_quietly(path)

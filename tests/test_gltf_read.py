@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -17,6 +19,7 @@ from conftest import recordings
 from gltf_avatars import BONES, NAMES, PLACES, STYLES, Style, body_mesh, make_avatar
 from gltf_independent import Scene
 from sixpoint.body import rotations as rot
+from sixpoint.body.surface.appearance import Texture
 from sixpoint.formats import load, load_avatar
 from sixpoint.formats.gltf.animation import Channel, find_grid
 from sixpoint.formats.gltf.avatar import Avatar
@@ -148,6 +151,48 @@ def test_textures_agree_with_the_colours_of_vertices(tmp_path):
     shown = look.texturing.tints * look.texturing.textures[0].sample(look.texturing.places)
     np.testing.assert_allclose(shown, look.colours, atol=1e-12)
     assert look.texturing.textures[0].wrap == ("clamp", "repeat")
+
+
+def srgb(light: np.ndarray) -> np.ndarray:
+    """Codes 0 to 255 of light, by the standard's formula."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055) * 255
+
+
+@pytest.mark.parametrize("size", [(64, 64), (101, 67)])
+def test_smaller_copies_of_a_texture_are_as_light(tmp_path, size):
+    """Black and white columns, one pixel each: half of the light at every level, whatever the size."""
+    picture = np.zeros((*size[::-1], 3), np.uint8)
+    picture[:, 1::2] = 255
+    levels = read_levels(tmp_path, picture)
+    assert len(levels) == 3
+    for level, image in enumerate(levels):
+        assert image.shape[:2] == tuple(-(-side // 2**level) for side in size[::-1])
+        even = Texture((image,)).sample(np.random.default_rng(level).random((4000, 2)))
+        np.testing.assert_allclose(even[:, :3].mean(axis=0), 0.5, atol=0.02)
+        if level and size == (64, 64):
+            np.testing.assert_allclose(image[..., :3], srgb(np.array(0.5)), atol=0.5)
+
+
+@pytest.mark.parametrize(("mode", "light", "opacity"), [("OPAQUE", 0.5, 255), ("MASK", 1.0, 128)])
+def test_what_cannot_be_seen_gives_smaller_copies_no_colour(tmp_path, mode, light, opacity):
+    """White columns between black ones without opacity, which opaque materials ignore."""
+    picture = np.zeros((64, 64, 4), np.uint8)
+    picture[:, 1::2] = 255
+    smaller = read_levels(tmp_path, picture, mode)[1]
+    np.testing.assert_allclose(smaller[..., :3], srgb(np.array(light)), atol=0.5)
+    np.testing.assert_array_equal(smaller[..., 3], opacity)
+
+
+def read_levels(folder: Path, picture: np.ndarray, mode: str = "OPAQUE") -> tuple[np.ndarray, ...]:
+    """The levels of an avatar's texture that has these pixels."""
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG")
+
+    def paint(builder: Any, nodes: dict[str, int]) -> None:
+        builder.content["images"][0]["bufferView"] = builder.add_view(stream.getvalue())
+        builder.content["materials"][0]["alphaMode"] = mode
+
+    return load_avatar(put(folder, Style(more=paint))).appearance.texturing.textures[0].levels
 
 
 def test_a_picture_that_cannot_be_decoded_is_said(tmp_path):

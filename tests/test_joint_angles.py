@@ -13,11 +13,14 @@ import sixpoint as sp
 from body_rigs import exercise, random_quaternions, reframed
 from sixpoint.body import rotations as rot
 from sixpoint.body.joint_angles import LIMBS, JointAngles, compute_joint_angles
+from sixpoint.body.limits import Limits
 from sixpoint.errors import FigureError, FormatError
 from sixpoint.formats.angles import save_angles
 from sixpoint.samples import make_sample
 
 FIGURE = sp.Figure.from_stature(1.75)
+RISE = np.radians(42.0)  # of the subtalar axis to the front
+AXES = dict(zip("xyz", np.eye(3), strict=True)) | {"subtalar": np.array([0.0, np.sin(RISE), np.cos(RISE)])}
 TO_OPENSIM = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # ours: X left, Y up, Z forward
 
 
@@ -28,7 +31,8 @@ def posed(**turns: tuple[str, float]) -> JointAngles:
         role, _, side = where.partition("_")
         joint = getattr(FIGURE.roles, role)
         joint = joint["lr".index(side)] if side else joint if isinstance(joint, int) else joint[0]
-        rotations[0, joint] = Rotation.from_euler(axis, degrees, degrees=True).as_quat()
+        turn = Rotation.from_rotvec(np.radians(degrees) * AXES[axis])
+        rotations[0, joint] = turn.as_quat()
     return compute_joint_angles(FIGURE.compute_motion(rotations, np.zeros((1, 3)), 60.0), FIGURE)
 
 
@@ -42,7 +46,8 @@ SIGNS = [
     ({"hip_l": ("y", 15)}, "hip_rotation_l", -15, "the left toes to the left: external rotation"),
     ({"knee_r": ("x", 60)}, "knee_angle_r", -60, "the calf backward: flexion is negative in gait2392"),
     ({"ankle_l": ("x", -10)}, "ankle_angle_l", 10, "the toes up: dorsiflexion"),
-    ({"ankle_r": ("z", 10)}, "subtalar_angle_r", 10, "the right sole to the left: inversion"),
+    ({"ankle_r": ("subtalar", 20)}, "subtalar_angle_r", 20, "the right sole to the left: inversion"),
+    ({"ankle_l": ("subtalar", 20)}, "subtalar_angle_l", -20, "the left sole to the left: eversion"),
     ({"shoulder_r": ("x", -90)}, "arm_flex_r", 90, "the arm forward: flexion"),
     ({"shoulder_r": ("z", -70)}, "arm_add_r", -70, "the right arm to the right: abduction"),
     ({"shoulder_l": ("z", 70)}, "arm_add_l", -70, "the left arm to the left: abduction"),
@@ -105,7 +110,9 @@ def test_rotations_follow_from_the_angles(sample):
     for k, (side, mirror) in enumerate((("l", -1), ("r", 1))):
         above = frames[:, roles.pelvis]
         for joint in ("hip", "knee", "ankle"):
-            above = above @ rebuilt([f"{column}_{side}" for column in LIMBS[joint]], mirror)
+            turn = rebuilt([f"{column}_{side}" for column in LIMBS[joint]], mirror)
+            tilt = Rotation.from_euler("z", RISE if joint == "ankle" else 0.0).as_matrix()
+            above = above @ tilt @ turn @ tilt.T
             np.testing.assert_allclose(above, frames[:, getattr(roles, joint)[k]], atol=1e-9)
         arm = [rebuilt([f"{c}_{side}" for c in LIMBS[j]], mirror) for j in ("shoulder", "elbow", "wrist")]
         torso = pelvis @ rebuilt(("lumbar_extension", "lumbar_bending", "lumbar_rotation"))
@@ -116,6 +123,21 @@ def test_rotations_follow_from_the_angles(sample):
     )
     jumps = np.abs(np.diff(angles.values, axis=0))
     assert np.all(jumps <= 180.0 + 1e-9)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_the_two_angles_of_an_ankle_are_the_figures_own(side):
+    """Dorsiflexion, then inversion about the hinges that limits have: both come back, the third is zero."""
+    hinges = Limits.default().ankle(1.0 - 2.0 * side)
+    turns = np.random.default_rng(side).uniform(hinges.lower, hinges.upper, (50, 2))
+    flexed, rolled = (Rotation.from_rotvec(turns[:, [k]] * hinges.axes[k]) for k in range(2))
+    rotations = np.tile([0.0, 0, 0, 1], (50, len(FIGURE.skeleton), 1))
+    rotations[:, FIGURE.roles.ankle[side]] = (flexed * rolled).as_quat()
+    angles = compute_joint_angles(FIGURE.compute_motion(rotations, np.zeros((50, 3)), 60.0), FIGURE)
+    found = [angles[f"{name}_{'lr'[side]}"] for name in LIMBS["ankle"]]
+    inward = 1.0 if side else -1.0
+    expected = [-np.degrees(turns[:, 0]), inward * np.degrees(turns[:, 1]), np.zeros(50)]
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_an_arm_raised_sideways_passes_ninety_degrees():

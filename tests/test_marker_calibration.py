@@ -225,6 +225,24 @@ def test_a_wrist_under_a_bar_is_found():
     assert np.abs(bones(found.figure) - bones(worn.model.figure))[3] < 0.012
 
 
+@pytest.mark.parametrize(
+    ("label", "place"), [("LWRB", "LANK"), ("LWRA", "LANK"), ("LWRB", "LELB"), ("LWRB", "LFRM")]
+)
+def test_a_wrong_label_of_a_wrist_is_no_bar(label, place):
+    """A wrist's label on an ankle, on the elbow or along the forearm: wrists are within 1.5 cm."""
+    worn, step = wear(seed=1), slice(0, None, 2)
+    points, names = np.array(worn.markers.positions), worn.markers.names
+    points[:, names.index(label)] = points[:, names.index(place)] + [0.0, 0.02, 0.0]
+    markers = replace(worn.markers, positions=points).sliced(step)
+    found = calibrate_markers(markers)
+    apart = np.linalg.norm(
+        pose_markers(found, markers).motion.positions - worn.motion.positions[step], axis=2
+    )
+    wrists = [found.figure.skeleton.index(f"{side}_wrist") for side in "lr"]
+    assert apart.mean(axis=0)[wrists].max() < 0.015
+    assert abs(bones(found.figure) - bones(worn.model.figure))[3] < 0.012
+
+
 def test_landmarks_of_joint_centres_are_joints():
     """Hips, knees, ankles and shoulders as pose estimators give them: bones are the distances between."""
     figure = Figure.from_stature(1.7)

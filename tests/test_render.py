@@ -11,7 +11,7 @@ import pytest
 import sixpoint as sp
 from body_rigs import family_skeleton
 from sixpoint.body import rotations as rot
-from sixpoint.body.surface.appearance import Texture, Texturing
+from sixpoint.body.surface.appearance import Texture, Texturing, halved
 from sixpoint.body.surface.flesh import build_shape
 from sixpoint.body.surface.shape import Shape
 from sixpoint.cli import main
@@ -422,9 +422,7 @@ def stripes(size=64):
     level[:, ::2, :3] = 0
     levels = [level]
     while len(levels[-1]) > 4:
-        level = levels[-1].astype(float)
-        half = (level[::2, ::2] + level[1::2, ::2] + level[::2, 1::2] + level[1::2, 1::2]) / 4
-        levels.append(np.round(half).astype(np.uint8))
+        levels.append(halved(levels[-1]))
     return Texture(tuple(levels))
 
 
@@ -462,6 +460,7 @@ def test_textures_are_as_fine_as_the_picture(far, contrast):
     corner = np.tile(shape.triangles[0], (500, 1))
     painting.apply(colours, np.zeros(500, int), corner, shares, np.full(500, far))
     assert (np.ptp(colours) > contrast) == (far < 1.0)
+    assert colours.mean() == pytest.approx(0.5, abs=0.03)  # as light from afar as from near
     plain = np.full((500, 3), 7.0, np.float32)
     painting.apply(plain, np.ones(500, int), corner, shares, np.full(500, far))
     assert np.all(plain == 7.0)

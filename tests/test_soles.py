@@ -15,6 +15,7 @@ from sixpoint.body.surface.flesh import build_shape
 from sixpoint.formats import load_avatar
 from sixpoint.jobs import driving
 from sixpoint.jobs.solving import Solving
+from sixpoint.live.feet import Floor, level_feet
 
 TALL = sp.Figure.from_stature(1.80)
 STOCKY = sp.Figure.from_segments(
@@ -51,6 +52,17 @@ def test_ankles_are_as_high_as_the_skin_says(lift):
     assert ankle_height(TALL.with_shape(shape)) == pytest.approx(ankle_height(TALL), abs=0.01)
     assert measure_feet(figure)[1] > 0.1
     assert measure_feet(TALL) is None
+
+
+def test_skin_is_measured_once_for_all_frames(monkeypatch):
+    """Feet levelled without a floor at hand find their skin as it was at the first frame."""
+    figure, placed = TALL.with_shape(build_shape(TALL)), []
+    place = sp.Shape.place
+    monkeypatch.setattr(sp.Shape, "place", lambda self, *where: placed.append(self) or place(self, *where))
+    poses = [level_feet(figure, figure.neutral_pose) for _ in range(3)]
+    assert placed == [figure.shape]
+    given = level_feet(figure, figure.neutral_pose, Floor.under(figure))
+    np.testing.assert_array_equal(poses[2].rotations, given.rotations)
 
 
 def test_a_body_without_skin_on_its_feet_has_those_of_its_bones():

@@ -11,6 +11,7 @@ Metres, radians, seconds; Y up, Z forward, X to the figure's left; quaternions a
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
@@ -22,9 +23,15 @@ else:
 
     def __getattr__(name):
         """Import the library when something of it is asked for: so a command line begins at once."""
-        api = import_module("sixpoint.api")
+        unknown = AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        if name != "__all__":
+            if name.startswith("_") or not name.isidentifier():  # as tools ask for __wrapped__ and such
+                raise unknown
+            if find_spec(f"{__name__}.{name}"):
+                return import_module(f"{__name__}.{name}")
+        api = import_module(f"{__name__}.api")
         if name != "__all__" and name not in api.__all__:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            raise unknown
         globals()[name] = found = getattr(api, name)
         return found
 

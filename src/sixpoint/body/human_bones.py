@@ -45,7 +45,7 @@ HUMAN_BONES = (
 )
 """The 55 names of Unity's HumanBodyBones, in its order."""
 
-_NEXT = {"Spine": ("Chest",), "Chest": ("UpperChest",), "Neck": ("Head",)}
+_NEXT = {"Spine": "Chest", "Chest": "UpperChest", "Neck": "Head"}
 """What a bone may have to point to."""
 TINY = 1e-6  # m, a chord without direction
 
@@ -182,8 +182,8 @@ class BonePoser:
         out = np.empty_like(local)
         for k, (name, bone) in enumerate(self.bones.items()):
             turned[name] = bent[name] = rot.mul(turned[bone.parent], local[:, k])
-            following = next((n for n in _NEXT.get(name, ()) if n in self.bones), None)
-            if following is not None and bone.origin != bone.joint:
+            following = _NEXT.get(name, "")
+            if following in self.bones and bone.origin != bone.joint:
                 straight = rot.mul_vec(turned[name], rot.unit(self.offsets[names.index(following)]))
                 chord = motion.positions[:, self.bones[following].origin] - motion.positions[:, bone.origin]
                 if straight.any() and np.linalg.norm(chord, axis=1).min() > TINY:

@@ -1,9 +1,10 @@
 """Anatomical joint angles of a motion, as clinicians and OpenSim have them.
 
 Each joint is the rotation of the segment below it in the frame of the segment above, as three angles about
-Z, X and Y in this order (X forward, Y up, Z right): flexion, ab- or adduction, rotation. Zero is the neutral
-pose: standing, arms hanging, palms to the thighs. Names, axes and signs are those of OpenSim's gait2392
-and, for arms, of Rajagopal's model; what these lack is named in their way (``docs/markers.md``).
+Z, X and Y in this order (X forward, Y up, Z right): flexion, ab- or adduction, rotation. At the ankle X is
+the subtalar axis, which rises to the front, and Y at right angles to it. Zero is the neutral pose: standing,
+arms hanging, palms to the thighs. Names, axes and signs are those of OpenSim's gait2392 and, for arms, of
+Rajagopal's model; what these lack is named in their way (``docs/markers.md``).
 
 References: G. Wu et al. 2002 and 2005 (ISB recommendations); S. Delp et al. 1990; A. Rajagopal et al. 2016.
 """
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure
+from sixpoint.body.limits import SUBTALAR
 from sixpoint.body.motion import Motion
 from sixpoint.body.skeleton import frozen
 from sixpoint.errors import FigureError
@@ -24,10 +26,11 @@ from sixpoint.errors import FigureError
 Array = NDArray[np.float64]
 
 _TO_OPENSIM = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])  # Z forward, X left -> X forward, Z right
+_RISE = rot.between([1.0, 0.0, 0.0], rot.mul_vec(_TO_OPENSIM, SUBTALAR))  # about Z, to the subtalar axis
 
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
 TRANSLATIONS = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
-# Of the right side: about Z, X and Y. On the left, X and Y have the other sign.
+# Of the right side: about Z, X and Y (the ankle's turned by _RISE). On the left, X and Y have the other sign.
 LIMBS = {
     "hip": ("hip_flexion", "hip_adduction", "hip_rotation"),
     "knee": ("knee_angle", "knee_adduction", "knee_rotation"),
@@ -103,7 +106,8 @@ def compute_joint_angles(motion: Motion, figure: Figure) -> JointAngles:
         for joint, columns in LIMBS.items():
             above = torso if joint == "shoulder" else above
             here = int(getattr(roles, joint)[side])
-            parts.append(_between(frames, above, here))
+            part = _between(frames, above, here)
+            parts.append(rot.mul(rot.inv(_RISE), rot.mul(part, _RISE)) if joint == "ankle" else part)
             names += [f"{column}_{letter}" for column in columns]
             signs += [1.0, mirror, mirror]
             above = here

@@ -25,9 +25,7 @@ SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be 
 GUIDE = np.radians(40.0)  # the first trunk bone tells the pelvis' up only if it is this near to the posture's
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
 STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
-AHEAD = (
-    0.35  # a foot that reaches less far forward [of its length] lies along the shank: steep ankles have 0.44
-)
+AHEAD = 0.35  # a foot that reaches less far forward [of its length] is along the shank; steep ones have 0.44
 
 
 def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = None) -> Array:

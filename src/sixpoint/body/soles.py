@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -34,6 +34,7 @@ def ankle_height(figure: Figure) -> float:
     return drop if drop > FLAT * height else _average_ankle() * height
 
 
+@lru_cache(maxsize=8)  # a whole skin is placed, and live feet are levelled at every frame
 def measure_feet(figure: Figure) -> tuple[float, float] | None:
     """How far the skin of the feet reaches below and before the ankles in the neutral pose [m].
 

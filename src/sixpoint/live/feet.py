@@ -28,7 +28,7 @@ FLEX = 0.9  # rad, most that an ankle is turned against its shank
 TOES = 0.10  # how far the toe tips are before the ankle, of the stature
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Floor:
     """A level floor under a figure.
 
@@ -50,7 +50,7 @@ class Floor:
         stature = stature_of(figure)
         skin = measure_feet(figure)
         ankle, toes = (ANKLE_HEIGHT * stature, TOES * stature) if skin is None else skin
-        return cls(stature, ankle, toes, height)
+        return cls(stature=stature, ankle=ankle, toes=toes, height=height)
 
 
 def level_feet(

@@ -17,6 +17,9 @@ Bytes = NDArray[np.uint8]
 _CODES = np.arange(256) / 255.0
 LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
 """Light of the 256 codes of sRGB."""
+_CODE = np.searchsorted(0.5 * (LINEAR[1:] + LINEAR[:-1]), np.arange(65536) / 65535.0).astype(np.uint8)
+"""The nearest code for light in 65535ths."""
+_LIGHT = np.rint(LINEAR * 65535.0).astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +44,22 @@ class Texture:
             for row in rows
         )
         return np.asarray(upper * (1 - down) + lower * down)
+
+
+def halved(image: Bytes) -> Bytes:
+    """An image (H, W, 4) at half its width and height, rounded up, with the light of the whole one.
+
+    Pixels count by their opacity, so that what cannot be seen gives no colour to what can.
+    """
+    height, width, _ = image.shape
+    even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    parts = [even[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+    opacity = np.asarray(np.sum([part[..., 3:] for part in parts], axis=0, dtype=np.int64))
+    light = np.asarray(sum(_LIGHT.take(part[..., :3]) for part in parts)) // 4
+    uneven = np.any([part[..., 3] != parts[0][..., 3] for part in parts], axis=0)
+    seen = sum(part[uneven, 3:] * _LIGHT.take(part[uneven, :3]).astype(np.int64) for part in parts)
+    light[uneven] = np.asarray(seen) // opacity[uneven]
+    return np.concatenate([_CODE.take(light), ((opacity + 2) // 4).astype(np.uint8)], axis=2)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

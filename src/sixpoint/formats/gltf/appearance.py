@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sixpoint.body.surface.appearance import Appearance, Bytes, Texture, Texturing
+from sixpoint.body.surface.appearance import Appearance, Bytes, Texture, Texturing, halved
 from sixpoint.formats.gltf.accessors import read_floats
 from sixpoint.formats.gltf.document import Document
 from sixpoint.formats.gltf.mesh import Piece
@@ -31,19 +31,20 @@ SMALLEST = 16  # pixels: smaller copies of an image show nothing
 
 def read_appearance(document: Document, pieces: list[Piece]) -> Appearance:
     """Colours and textures of all pieces, in their order."""
-    textures: dict[int, Texture | None] = {}
+    textures: dict[tuple[int, bool], Texture | None] = {}
     used: list[Texture] = []
     colours, chosen, places, tints = [], [], [], []
     for piece in pieces:
         tint, reference = _read_tint(document, piece)
-        texture = None if reference is None else _texture(document, reference["index"], textures)
+        opaque = _is_opaque(document, piece)
+        texture = None if reference is None else _texture(document, reference["index"], opaque, textures)
         place = None if reference is None or texture is None else _read_uv(document, piece, reference)
         number, colour = -1, tint
         if texture is not None and place is not None:
             if texture not in used:
                 used.append(texture)
             number, colour = used.index(texture), tint * texture.sample(place)
-        if _is_opaque(document, piece):
+        if opaque:
             colour[:, 3] = 1.0
         colours.append(np.clip(colour, 0.0, 1.0))
         chosen.append(np.full(len(piece.triangles), number))
@@ -102,27 +103,29 @@ def _read_uv(document: Document, piece: Piece, reference: dict[str, Any]) -> Arr
     return np.asarray((uv * scale) @ np.array([[c, -s], [s, c]]) + offset)
 
 
-def _texture(document: Document, index: int, textures: dict[int, Texture | None]) -> Texture | None:
-    """A texture; None where its image cannot be had."""
-    if index not in textures:
+def _texture(
+    document: Document, index: int, opaque: bool, textures: dict[tuple[int, bool], Texture | None]
+) -> Texture | None:
+    """A texture, without its opacity for opaque materials; None where its image cannot be had."""
+    if (index, opaque) not in textures:
         texture = document.items("textures")[index]
         webp = texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source")
         source = texture.get("source", webp)
-        textures[index] = None
+        textures[index, opaque] = None
         if isinstance(source, int) and 0 <= source < len(document.items("images")):
             try:
-                levels = _decode(read_image(document, source)[0])
+                levels = _decode(read_image(document, source)[0], opaque)
                 sampler = texture.get("sampler")
                 keys = {} if sampler is None else document.items("samplers")[sampler]
                 wrap = (
                     WRAPS.get(keys.get("wrapS", REPEAT), "repeat"),
                     WRAPS.get(keys.get("wrapT", REPEAT), "repeat"),
                 )
-                textures[index] = Texture(levels, wrap)
+                textures[index, opaque] = Texture(levels, wrap)
             except Exception as error:  # Pillow raises many kinds on damaged images
                 label = document.label("images", source)
                 warnings.warn(f"{document.path}: {label} cannot be decoded: {error}", stacklevel=6)
-    return textures[index]
+    return textures[index, opaque]
 
 
 def read_image(document: Document, index: int) -> tuple[bytes, str]:
@@ -150,13 +153,15 @@ def read_image(document: Document, index: int) -> tuple[bytes, str]:
     return data, str(image.get("mimeType", "image/png"))
 
 
-def _decode(data: bytes) -> tuple[Bytes, ...]:
+def _decode(data: bytes, opaque: bool) -> tuple[Bytes, ...]:
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as picture:
         if picture.width * picture.height > MOST_PIXELS:
             raise ValueError(f"{picture.width} x {picture.height} pixels are too many")
-        levels = [picture.convert("RGBA")]
-    while min(levels[-1].size) >= 2 * SMALLEST:
-        levels.append(levels[-1].reduce(2))
-    return tuple(np.asarray(level) for level in levels)
+        levels = [np.array(picture.convert("RGBA"))]
+    if opaque:
+        levels[0][..., 3] = 255
+    while min(levels[-1].shape[:2]) >= 2 * SMALLEST:
+        levels.append(halved(levels[-1]))
+    return tuple(levels)

@@ -1,15 +1,17 @@
 """An arm whose elbow is in the trunk gets it out: swivelled, or straight where it misses.
 
-A bent arm turns about the line from shoulder to wrist, by K times the depth over the length of the upper arm
-at first (``clear_arm``; ``clear_arm_steadily`` begins at the angle of the last frame), so the wrist stays
-where it is. An arm that misses its target turns about v x w by arccos(v . w), where v and w are the
-directions from the shoulder to the deepest point and to the nearest point of the outline.
+A bent arm turns about the line from shoulder to wrist, so the wrist stays where it is. ``clear_arm`` turns it
+outward by K times the depth over the length of the upper arm, then by secant steps to the same side
+(``step_out``); where these do not get it out, to the nearest free angle on either side (``find_free``).
+``clear_arm_steadily`` looks for that at once, from the angle of the last frame. An arm that misses its target
+turns about v x w by arccos(v . w), where v and w are the directions from the shoulder to the deepest point
+and to the nearest point of the outline.
 
 Where this differs from the paper: it repeats steps of K times the depth to one side until the elbow is out;
-here the angle is looked for to both sides, and its edge, since limits may forbid the nearer side and a step
-overshoots. It turns an arm about v x w that must be almost or fully stretched to reach; here only one that
-misses anyway, since a nearly stretched arm would leave its target, and its swivel angle still moves the elbow
-(by 6 cm where the arm is 2 % longer than its target is far).
+here later steps are secants, since those creep or overshoot, and both sides are searched where the first is
+barred by limits or flesh. It turns an arm about v x w that must be almost or fully stretched to reach; here
+only one that misses anyway, since a nearly stretched arm would leave its target, and its swivel angle still
+moves the elbow (by 6 cm where the arm is 2 % longer than its target is far).
 
 Reference: Unzueta et al. 2008, section 8 and Algorithm 5, line 7.
 """

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sixpoint.body.figure import Figure, SpineChain
-from sixpoint.body.surface.flesh_regions import thigh_radii
+from sixpoint.body.surface.flesh_regions import PALM, thigh_radii, unit_of
 from sixpoint.body.surface.prisms import build_prisms
 from sixpoint.errors import SixpointError, listed
 from sixpoint.solvers.avoidance.packing import WIDTH, pack_flesh, pack_thighs
@@ -54,4 +54,5 @@ def find_flesh(
     if "thighs" not in avoid and not arms:
         return trunk, None
     balls = (*prisms.elbow, *prisms.forearm) if prisms is not None and arms else ()
-    return trunk, pack_thighs(thigh_radii(figure), balls, lengths, "thighs" in avoid)
+    palm = PALM * unit_of(figure)
+    return trunk, pack_thighs(thigh_radii(figure), balls, lengths, "thighs" in avoid, palm)

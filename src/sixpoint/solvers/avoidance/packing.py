@@ -1,11 +1,10 @@
 """How the flesh of a figure crosses into compiled code: one array, a row per prism and one for the arms.
 
 A prism's row: x and z of its centre line, least and largest height, largest radius, outlines per metre, then
-the grown outlines (7, 33) as |x| + |z| of their points, see ``body.prisms.directions``; the last point is the
-first. The arms' row: number of balls, how far
-from the elbow the farthest is [m], then per ball 1 for the line elbow-wrist or 0 for elbow-shoulder, the
-share of it, by how much the ball is smaller than the radius by which outlines are grown, and how far it is
-beside the line, to where the elbow folds [m].
+the grown outlines (7, 33) as |x| + |z| of their points, see ``body.surface.prisms.directions``; the last
+point is the first. The arms' row: number of balls, how far from the elbow the farthest is [m], then per ball
+1 for the line elbow-wrist or 0 for elbow-shoulder, the share of it, by how much the ball is smaller than the
+radius by which outlines are grown, and how far it is beside the line, to where the elbow folds [m].
 
 Thighs cross in a second array of rows of four, or as None where nothing stays out of them: radius at hip and
 knee [m], number of the arms' balls, and 1 if thighs stay out of each other; how far from the elbow the
@@ -27,7 +26,6 @@ WIDTH = HEADER + SLICES * RING
 BALL = 4
 SPREAD, FIRST_BALL = 1, 2
 THIGH_HEADER = 2
-PALM = 0.02  # m, most of a hand beside a thigh: they touch where a body just stands
 
 
 class Flesh(NamedTuple):
@@ -53,7 +51,7 @@ def pack_flesh(prisms, lengths, forearms):
     """Flesh of a figure as an array (P + 1, W).
 
     Args:
-        prisms: See ``body.prisms``.
+        prisms: See ``body.surface.prisms``.
         lengths: Of upper arm and forearm [m].
         forearms: Whether with the balls of the forearms.
     """
@@ -70,14 +68,15 @@ def pack_flesh(prisms, lengths, forearms):
     return table
 
 
-def pack_thighs(radii, balls, lengths, apart):
+def pack_thighs(radii, balls, lengths, apart, palm):
     """Thighs of a figure as an array (2 + B, 4).
 
     Args:
         radii: At hip and knee [m].
-        balls: Of an arm, see ``body.prisms``; none where arms may touch thighs.
+        balls: Of an arm, see ``body.surface.prisms``; none where arms may touch thighs.
         lengths: Of upper arm and forearm [m].
         apart: Whether thighs stay out of each other.
+        palm: Most of a hand beside a thigh [m]: they touch where a body just stands.
     """
     table = np.zeros((THIGH_HEADER + len(balls), 4))
     table[0] = *radii, len(balls), apart
@@ -85,7 +84,7 @@ def pack_thighs(radii, balls, lengths, apart):
         wrist = min((b for b in balls if b.forearm), key=lambda ball: abs(ball.share - 1.0))
         table[1, :2] = _spread(balls, lengths), wrist.radius
         table[THIGH_HEADER:] = [
-            (b.forearm, b.share, min(b.radius, PALM) if b.share > 1.0 else b.radius, b.beside) for b in balls
+            (b.forearm, b.share, min(b.radius, palm) if b.share > 1.0 else b.radius, b.beside) for b in balls
         ]
     return table
 

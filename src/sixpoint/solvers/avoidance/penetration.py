@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.figure import Figure, SpineChain
 from sixpoint.body.motion import Motion
-from sixpoint.body.surface.flesh_regions import thigh_radii
+from sixpoint.body.surface.flesh_regions import PALM, thigh_radii, unit_of
 from sixpoint.body.surface.prisms import build_prisms
 from sixpoint.errors import SkeletonError
 from sixpoint.solvers.avoidance.depths import find_depths
@@ -64,8 +64,8 @@ def find_penetration(
     trunk = np.ascontiguousarray(rows[:, joints])
     arms = np.ascontiguousarray(rows[:, [j for limb in roles.limbs[:2] for j in limb]])
     legs = np.ascontiguousarray(rows[:, [j for limb in roles.limbs[2:] for j in limb[:2]]])
-    lengths, radii = arm_lengths(figure), thigh_radii(figure)
-    nothing, no_arm = np.zeros((1, WIDTH)), pack_thighs(radii, (), lengths, False)
+    lengths, radii, palm = arm_lengths(figure), thigh_radii(figure), PALM * unit_of(figure)
+    nothing, no_arm = np.zeros((1, WIDTH)), pack_thighs(radii, (), lengths, False, palm)
     depths, apart = np.zeros((len(positions), 2)), np.zeros(len(positions))
     found = {}
     for name in names:
@@ -77,7 +77,7 @@ def find_penetration(
             table = pack_flesh(replace(prisms, elbow=()), lengths, True)
         elif name == "arms":
             prisms = build_prisms(figure, chain)
-            thighs = pack_thighs(radii, (*prisms.elbow, *prisms.forearm), lengths, False)
+            thighs = pack_thighs(radii, (*prisms.elbow, *prisms.forearm), lengths, False, palm)
         work = np.zeros((len(joints), 4))
         find_depths(np.ascontiguousarray(table), thighs, turned, trunk, arms, legs, work, depths, apart)
         found[name] = apart[:, None].copy() if name == "thighs" else depths.copy()

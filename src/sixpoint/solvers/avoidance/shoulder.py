@@ -20,7 +20,7 @@ CLOSE = 5e-3  # rad, an angle so near to the least one is it
 
 @helper
 def draw_clavicle(model, limits, limb, angle, base, world, frame, place):
-    """A clavicle turned from ``base`` about Y by an angle, within its limits.
+    """A clavicle turned from ``base`` about Y by an angle and about X by ``TILT`` of that, within its limits.
 
     Returns its local rotation, the world rotation of what carries the shoulder, and where the shoulder is.
     """

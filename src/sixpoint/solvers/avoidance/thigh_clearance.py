@@ -6,8 +6,8 @@ from sixpoint.kernels import vector as vec
 from sixpoint.kernels.jit import helper, specialised
 from sixpoint.solvers.avoidance.packing import THIGH_HEADER
 
-FIRST = 0.25  # as ``body.flesh_regions.NEAR_HIP``; written out, see ``packing``
-BELOW_HIP = 0.25  # the same for arms: nearer to the hip flesh is rounder than a capsule
+# Share of a thigh above which nothing is kept away from it: flesh is rounder there than a capsule.
+BELOW_HIP = 0.25  # as ``body.surface.flesh_regions.NEAR_HIP``; written out, see ``packing``
 ROUNDS = 3  # of finding the nearest points of two capsules
 WIDEST = 4.0  # m, beyond any gap
 
@@ -45,16 +45,16 @@ def gap_of_thighs(placed, hip_radius, knee_radius):
     room = aa * bb - ab * ab
     nearest = 1.0
     if room > 1e-6 * aa * bb:  # where their lines are nearest
-        nearest = min(max((ab * vec.dot(b, r) - bb * vec.dot(a, r)) / room, FIRST), 1.0)
+        nearest = min(max((ab * vec.dot(b, r) - bb * vec.dot(a, r)) / room, BELOW_HIP), 1.0)
     least = WIDEST
-    for start in (nearest, 1.0, FIRST):  # nearly parallel thighs are nearest at an end of one
+    for start in (nearest, 1.0, BELOW_HIP):  # nearly parallel thighs are nearest at an end of one
         share = start
         for _ in range(ROUNDS):
             other, _ = place_on(
-                other_hip, other_knee, hip_radius, knee_radius, FIRST, vec.madd(hip, share, a)
+                other_hip, other_knee, hip_radius, knee_radius, BELOW_HIP, vec.madd(hip, share, a)
             )
             beyond = vec.madd(other_hip, other, b)
-            share, gap = place_on(hip, knee, hip_radius, knee_radius, FIRST, beyond)
+            share, gap = place_on(hip, knee, hip_radius, knee_radius, BELOW_HIP, beyond)
             least = min(least, gap - hip_radius - other * (knee_radius - hip_radius))
     return least
 
