@@ -29,7 +29,7 @@ from sixpoint.jobs.track.report import describe_tracking
 from sixpoint.jobs.writing import save_dressed
 from sixpoint.live.frames import play_frames
 from sixpoint.live.statistics import Statistics
-from sixpoint.study.tracking import LOST, REFUSED, USED, overall, summarise_markers
+from sixpoint.study.tracking import LOST, REFUSED, USED, draw_residuals, overall, summarise_markers
 from track_bodies import body
 
 FRAMES = 90
@@ -226,6 +226,21 @@ def test_a_foot_that_turns_slowly_does_not_stand():
     still = np.zeros((60, 2, 3))
     creeping = still + 0.2 * np.arange(60)[:, None, None] / 60 * [1.0, 0.0, 0.0]
     assert _is_still(still, 4).all() and not _is_still(creeping, 4).any()
+
+
+def test_frames_with_nobody_are_named(files, tmp_path):
+    """The command says where nobody is seen; the curve of residuals has a gap there."""
+    case = body("walk")
+    positions = case.markers[:60].copy()
+    positions[:10] = positions[30:41] = positions[59] = np.nan
+    save_markers(Markers(case.model.names, positions, 60.0), tmp_path / "gaps.npz")
+    done = track(tmp_path / "gaps.npz", tmp_path / "a.bvh", following=following(files))
+    assert "frames 0 to 9, 30 to 40, 59:" in dict(describe_tracking(done))["nobody"]
+    residual, flags = done.tracked.residual, done.tracked.flags
+    rows = summarise_markers(done.model.names, residual, flags)
+    canvas = draw_residuals(rows, residual, flags, 60.0, "")
+    curve = canvas.axes[1].lines[0].get_ydata()
+    assert np.isnan(curve[[0, 35, 59]]).all() and np.isfinite(curve[[10, 29, 41]]).all()
 
 
 def test_a_choice_of_markers(files, tmp_path):

@@ -105,6 +105,7 @@ def draw_residuals(
     times = np.arange(len(residual)) / rate
     count = np.maximum(used.sum(axis=1), 1)
     rms = 100 * np.sqrt(np.where(used, residual**2, 0.0).sum(axis=1) / count)
+    rms[~used.any(axis=1)] = np.nan  # nobody is seen: nothing fits well there
     axes.fill_between(times, rms, color=LEFT, alpha=0.13, lw=0)
     axes.plot(times, rms, color=LEFT, lw=1.4)
     if room:
@@ -114,7 +115,7 @@ def draw_residuals(
         twin.set_ylabel("not used [%]", color=RIGHT, size=9.5)
         twin.tick_params(colors=SOFT, labelsize=9, length=0)
         twin.spines[:].set_visible(False)
-    axes.set_ylim(0, max(1.15 * rms.max(), 0.1))
+    axes.set_ylim(0, max(1.15 * float(np.nanmax(np.append(rms, 0.0))), 0.1))
     style_axes(axes, times, "RMS of all markers [cm]")
     note = f"RMS {100 * overall(residual, flags):.2f} cm,  {np.mean(seen):.1%} of the samples seen"
     add_heading(canvas, _plain(title, 60), note)

@@ -9,6 +9,7 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.motion import Motion
 from sixpoint.signals.contacts import find_contacts
+from sixpoint.signals.gaps import find_runs
 from sixpoint.solvers.tracking.priorities import find_parts
 
 Array = NDArray[np.float64]
@@ -87,7 +88,7 @@ def _is_still(points: Array, frames: int) -> NDArray[np.bool_]:
 def _stands(flags: NDArray[np.bool_], ends: Array) -> list[tuple[int, int]]:
     """Runs of set flags, cut where an end of the foot (F, 2, 3) has crept away from its place."""
     found = []
-    for start, stop in _runs(flags):
+    for start, stop in find_runs(flags):
         begun = start
         for f in range(start, stop):
             if np.linalg.norm(ends[f] - ends[begun], axis=-1).max() > DRIFT:
@@ -102,9 +103,3 @@ def _share(frames: int, rate: float) -> Array:
     edge = np.minimum(np.arange(frames) + 1.0, np.arange(frames, 0, -1.0)) / (FADE * rate)
     x = np.clip(edge, 0.0, 1.0)
     return np.asarray(x * x * (3 - 2 * x))
-
-
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one past the last frame of every run of set flags."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

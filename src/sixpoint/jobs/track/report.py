@@ -11,6 +11,7 @@ from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.track.job import Tracking
 from sixpoint.jobs.track.models import near_pairs
 from sixpoint.jobs.writing import prepare_folder
+from sixpoint.signals.gaps import find_runs
 from sixpoint.study.canvas import save_canvas
 from sixpoint.study.comparison.curves import encode
 from sixpoint.study.document import Bullets, Document, Heading, Paragraph, Picture, Table, to_markdown
@@ -68,6 +69,7 @@ def build_document(done: Tracking) -> Document:
     )
 
 
+FEW = 3  # used markers; fewer tell of nobody
 COLUMNS = ("marker", "RMS [cm]", "worst [cm]", "at frame", "seen", "refused", "swapped")
 
 
@@ -96,6 +98,10 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
         ("samples", f"{seen.mean():.1%} seen; {_counted(tracked.flags == 2, done)} refused as ghosts"),
         ("speed", f"{times:.0f} times real time ({spent:.2f} ms per frame)"),
     ]
+    told = np.isin(tracked.flags, (0, 3)).sum(axis=1) >= FEW
+    if not told.all():
+        frames = [f"{a} to {b - 1}" if b - a > 1 else f"{a}" for a, b in find_runs(~told)]
+        rows.append(("nobody", f"to be seen in frames {listed(frames, 8)}: what is written there is a guess"))
     if done.calibration:
         rows.insert(0, ("calibration", f"{done.calibration:.1f} s; --model reuses a saved one"))
     swapped = tracked.flags == 3
@@ -130,6 +136,6 @@ def _counted(flags: np.ndarray, done: Tracking) -> str:
 
 
 def _poses(done: Tracking):  # type: ignore[no-untyped-def]
-    return draw_tracking(
-        done.model.figure, done.tracked.motion, done.positions, done.tracked.flags, done.markers.name
-    )
+    """What is written: the body that follows, or the one that six points pose."""
+    motion = done.tracked.motion if done.six is None else done.six[1].solution.motion
+    return draw_tracking(done.model.figure, motion, done.positions, done.tracked.flags, done.markers.name)
