@@ -30,10 +30,6 @@ def recordings(*patterns: str) -> list[Any]:
     return [pytest.param(path, id=str(path.relative_to(folder))) for path in found if folder]
 
 
-unmeasured = pytest.mark.xfail(reason="bounds are estimates: not yet measured on recordings", strict=False)
-"""For a new test on real recordings, until it was run on them."""
-
-
 @pytest.fixture
 def data() -> Path:
     """The folder of real recordings."""
