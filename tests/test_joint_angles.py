@@ -130,9 +130,8 @@ def test_rotations_follow_from_the_angles(sample):
 def test_the_pelvis_lies_in_the_unturned_world(heading):
     """Who faces +X has pelvis_rotation 0, who faces +Z, as figures at rest, -90; the place is the joint's."""
     rotations = np.tile([0.0, 0, 0, 1], (1, len(FIGURE.skeleton), 1))
-    ahead = np.array(
-        [np.cos(np.radians(heading)), 0.0, -np.sin(np.radians(heading))]
-    )  # to the left: towards -Z
+    # Turning left from +X leads towards -Z.
+    ahead = np.array([np.cos(np.radians(heading)), 0.0, -np.sin(np.radians(heading))])
     turn = np.column_stack([np.cross([0, 1, 0], ahead), [0, 1, 0], ahead])  # our X left, Y up, Z forward
     rotations[0, FIGURE.roles.pelvis] = Rotation.from_matrix(turn).as_quat()
     motion = FIGURE.compute_motion(rotations, np.array([[0.5, 1.0, -2.0]]), 60.0)
@@ -143,7 +142,7 @@ def test_the_pelvis_lies_in_the_unturned_world(heading):
 
 
 def test_angles_lie_in_the_laboratory_of_the_markers(data, tmp_path):
-    """OpenSim's walking person: the .mot has the heading, place and way of the pelvis markers of the .trc."""
+    """OpenSim's walking person: the .mot has the heading and place of the pelvis markers of the .trc."""
     trials = [data / "trc" / f"opensim_subject01_{name}.trc" for name in ("walk", "static")]
     if not all(path.exists() for path in trials):
         pytest.skip("no recording of OpenSim's subject01 in the data")
