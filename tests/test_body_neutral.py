@@ -82,6 +82,40 @@ def test_any_standing_rest_pose_gives_the_anatomical_rotations(kind, up):
     assert np.degrees(error).max() < 0.5
 
 
+@pytest.mark.parametrize("raised", [-85.0, 75.0, 90.0, 120.0])
+def test_clavicles_that_are_no_posture_are_spread(raised):
+    """Clavicles that rest along the spine point to their sides in the neutral pose, and arms bend as ever."""
+    figure = sp.Figure.from_stature(1.75)
+    motion = exercise(figure)
+    assert figure.roles.clavicle
+    local = np.tile(rot.IDENTITY, (len(figure.skeleton), 1))
+    for k, sign in enumerate((1.0, -1.0)):
+        local[figure.roles.clavicle[k]] = rot.from_axis_angle(Z, sign * np.radians(raised))
+        local[figure.roles.shoulder[k]] = rot.from_axis_angle(Z, sign * np.pi / 2)
+    rig = reframed(motion, rot.inv(figure.skeleton.compute_transforms(local)[1]))
+    found = sp.Figure.from_motion(rig)
+    assert_neutral(found)
+    for joint, shoulder, side in zip(found.roles.clavicle, found.roles.shoulder, (X, -X), strict=True):
+        assert angle(found.rest_positions[shoulder] - found.rest_positions[joint], side) < 1e-3
+    arms = [j for limb in found.roles.limbs for j in limb[:2]]
+    error = rot.angle(rot.mul(anatomical(found, rig), rot.inv(anatomical(figure, motion))))[:, arms]
+    assert np.degrees(error).max() < 0.5
+
+
+def test_a_t_pose_is_reached_on_a_rig_of_one_axis(data):
+    """GenoView's rig rests with its clavicles along the spine; its T-pose is reached to a millimetre."""
+    path = data / "misc" / "GenoView_Geno_stance.bvh"
+    if not path.exists():
+        pytest.skip("GenoView_Geno_stance.bvh is not in the data")
+    motion = load(path)
+    figure = sp.Figure.from_motion(motion)
+    targets = figure.targets(motion)
+    for method in ("sik", "sik+"):
+        posed = sp.make_solver(method, figure).solve_motion(targets)
+        missed = figure.targets(posed).positions - targets.positions
+        assert np.linalg.norm(missed, axis=-1).max() < 1e-3
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_nonsense_rest_pose_is_learnt_from_the_motion(seed):
     """Random joint frames, names and scale: limbs are recovered within 2 degrees, the trunk roughly."""

@@ -15,17 +15,21 @@ from sixpoint.body import rotations as rot
 from sixpoint.body.joint_angles import LIMBS, JointAngles, compute_joint_angles
 from sixpoint.body.limits import Limits
 from sixpoint.errors import FigureError, FormatError
+from sixpoint.formats import load_markers, save_markers
 from sixpoint.formats.angles import save_angles
+from sixpoint.jobs.track.job import track
+from sixpoint.jobs.track.options import Following
 from sixpoint.samples import make_sample
 
 FIGURE = sp.Figure.from_stature(1.75)
 RISE = np.radians(42.0)  # of the subtalar axis to the front
 AXES = dict(zip("xyz", np.eye(3), strict=True)) | {"subtalar": np.array([0.0, np.sin(RISE), np.cos(RISE)])}
-TO_OPENSIM = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # ours: X left, Y up, Z forward
+SEGMENT = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])  # forward, up and right in ours (X left, Z forward)
+FACING_X = Rotation.from_euler("y", 90, degrees=True)  # from our +Z, where figures look, to OpenSim's +X
 
 
 def posed(**turns: tuple[str, float]) -> JointAngles:
-    """Angles of the built-in figure with single joints turned: role_side -> (axis of ours, degrees)."""
+    """Angles of the figure facing +X with single joints turned: role_side -> (axis of ours, degrees)."""
     rotations = np.tile([0.0, 0, 0, 1], (1, len(FIGURE.skeleton), 1))
     for where, (axis, degrees) in turns.items():
         role, _, side = where.partition("_")
@@ -33,6 +37,8 @@ def posed(**turns: tuple[str, float]) -> JointAngles:
         joint = joint["lr".index(side)] if side else joint if isinstance(joint, int) else joint[0]
         turn = Rotation.from_rotvec(np.radians(degrees) * AXES[axis])
         rotations[0, joint] = turn.as_quat()
+    pelvis = FIGURE.roles.pelvis
+    rotations[0, pelvis] = (FACING_X * Rotation.from_quat(rotations[0, pelvis])).as_quat()
     return compute_joint_angles(FIGURE.compute_motion(rotations, np.zeros((1, 3)), 60.0), FIGURE)
 
 
@@ -98,7 +104,7 @@ def test_rotations_follow_from_the_angles(sample):
     motion = make_sample(sample, FIGURE)
     angles = compute_joint_angles(motion, FIGURE)
     world = Rotation.from_quat(motion.transforms[1].reshape(-1, 4)).as_matrix().reshape(len(motion), -1, 3, 3)
-    frames = TO_OPENSIM @ world @ TO_OPENSIM.T
+    frames = world @ SEGMENT
     roles = FIGURE.roles
 
     def rebuilt(columns, mirror=1):
@@ -117,10 +123,8 @@ def test_rotations_follow_from_the_angles(sample):
         arm = [rebuilt([f"{c}_{side}" for c in LIMBS[j]], mirror) for j in ("shoulder", "elbow", "wrist")]
         torso = pelvis @ rebuilt(("lumbar_extension", "lumbar_bending", "lumbar_rotation"))
         np.testing.assert_allclose(torso @ arm[0] @ arm[1] @ arm[2], frames[:, roles.wrist[k]], atol=1e-9)
-    place = motion.positions[:, roles.pelvis] @ TO_OPENSIM.T
-    np.testing.assert_allclose(
-        np.stack([angles[f"pelvis_t{axis}"] for axis in "xyz"], axis=1), place, atol=1e-12
-    )
+    place = np.stack([angles[f"pelvis_t{axis}"] for axis in "xyz"], axis=1)
+    np.testing.assert_array_equal(place, motion.positions[:, roles.pelvis])
     jumps = np.abs(np.diff(angles.values, axis=0))
     assert np.all(jumps <= 180.0 + 1e-9)
 
@@ -138,6 +142,43 @@ def test_the_two_angles_of_an_ankle_are_the_figures_own(side):
     inward = 1.0 if side else -1.0
     expected = [-np.degrees(turns[:, 0]), inward * np.degrees(turns[:, 1]), np.zeros(50)]
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("heading", [-135, -90, -30, 0, 60, 90])
+def test_the_pelvis_lies_in_the_unturned_world(heading):
+    """Who faces +X has pelvis_rotation 0, who faces +Z, as figures at rest, -90; the place is the joint's."""
+    rotations = np.tile([0.0, 0, 0, 1], (1, len(FIGURE.skeleton), 1))
+    # Turning left from +X leads towards -Z.
+    ahead = np.array([np.cos(np.radians(heading)), 0.0, -np.sin(np.radians(heading))])
+    turn = np.column_stack([np.cross([0, 1, 0], ahead), [0, 1, 0], ahead])  # our X left, Y up, Z forward
+    rotations[0, FIGURE.roles.pelvis] = Rotation.from_matrix(turn).as_quat()
+    motion = FIGURE.compute_motion(rotations, np.array([[0.5, 1.0, -2.0]]), 60.0)
+    angles = compute_joint_angles(motion, FIGURE)
+    assert angles["pelvis_rotation"][0] == pytest.approx(heading)
+    assert angles["pelvis_tilt"][0] == pytest.approx(0, abs=1e-9)
+    np.testing.assert_array_equal(angles.values[0, 3:6], motion.positions[0, FIGURE.roles.pelvis])
+
+
+def test_angles_lie_in_the_laboratory_of_the_markers(data, tmp_path):
+    """OpenSim's walking person: the .mot has the heading and place of the pelvis markers of the .trc."""
+    trials = [data / "trc" / f"opensim_subject01_{name}.trc" for name in ("walk", "static")]
+    if not all(path.exists() for path in trials):
+        pytest.skip("no recording of OpenSim's subject01 in the data")
+    markers = load_markers(trials[0]).sliced(slice(0, 30))
+    save_markers(markers, tmp_path / "walk.trc", unit="m")
+    track(tmp_path / "walk.trc", tmp_path / "walk.mot", following=Following(static=trials[1]))
+    _, names, rows = read_mot(tmp_path / "walk.mot")
+    mot = dict(zip(names, rows.T, strict=True))
+    trc = np.loadtxt(trials[0], skiprows=6)[:30, 2:].reshape(30, -1, 3) / 1000  # our reader is not asked
+    left, right, back = (trc[:, markers.names.index(name)] for name in ("L.ASIS", "R.ASIS", "V.Sacral"))
+    across = right - left
+    heading = np.degrees(np.arctan2(across[:, 0], across[:, 2]))  # of the line to +Z, about +Y
+    np.testing.assert_allclose(mot["pelvis_rotation"], heading, atol=4)
+    place = np.column_stack([mot[f"pelvis_t{axis}"] for axis in "xyz"])
+    shift = place - ((left + right) / 2 + back) / 2
+    assert np.abs(shift).max() < 0.03
+    written = np.loadtxt(tmp_path / "walk.trc", skiprows=6)[:, 2:]
+    np.testing.assert_allclose(written, trc.reshape(30, -1), atol=1e-8)
 
 
 def test_an_arm_raised_sideways_passes_ninety_degrees():

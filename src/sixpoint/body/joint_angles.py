@@ -6,6 +6,9 @@ the subtalar axis, which rises to the front, and Y at right angles to it. Zero i
 arms hanging, palms to the thighs. Names, axes and signs are those of OpenSim's gait2392 and, for arms, of
 Rajagopal's model; what these lack is named in their way (``docs/markers.md``).
 
+The world is the motion's own, unturned: angles lie where the markers do. Above the pelvis is the world, so
+a person who faces +X has pelvis_rotation 0, and one who faces +Z, as figures do at rest, -90.
+
 References: G. Wu et al. 2002 and 2005 (ISB recommendations); S. Delp et al. 1990; A. Rajagopal et al. 2016.
 """
 
@@ -25,7 +28,9 @@ from sixpoint.errors import FigureError
 
 Array = NDArray[np.float64]
 
-_TO_OPENSIM = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])  # Z forward, X left -> X forward, Z right
+# Turns a segment's axes, X forward and Z right, into ours: Z forward, X left.
+_FROM_OPENSIM = np.array([0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+_TO_OPENSIM = rot.inv(_FROM_OPENSIM)
 _RISE = rot.between([1.0, 0.0, 0.0], rot.mul_vec(_TO_OPENSIM, SUBTALAR))  # about Z, to the subtalar axis
 
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
@@ -48,7 +53,7 @@ class JointAngles:
     """Named angles over F frames.
 
     Attributes:
-        names: N columns; ``TRANSLATIONS`` are the place of the pelvis, all others are angles.
+        names: N columns; ``TRANSLATIONS`` are the place of the pelvis in the world, all others are angles.
         values: (F, N) [deg], and [m] for ``TRANSLATIONS``.
         rate: Frames per second [Hz].
         name: Short name for messages and file names.
@@ -92,7 +97,7 @@ def compute_joint_angles(motion: Motion, figure: Figure) -> JointAngles:
         raise FigureError("the motion is on another skeleton than this figure")
     roles, (positions, world) = figure.roles, motion.transforms
     turned = rot.mul(world, rot.inv(figure.neutral))  # identity in the neutral pose
-    frames = rot.mul(_TO_OPENSIM, rot.mul(turned, rot.inv(_TO_OPENSIM)))
+    frames = rot.mul(turned, _FROM_OPENSIM)
     torso = _find_torso(figure)
     names = [*PELVIS, *LUMBAR, *NECK]
     parts = [
@@ -113,10 +118,9 @@ def compute_joint_angles(motion: Motion, figure: Figure) -> JointAngles:
             above = here
     angles = _continuous(rot.to_euler("ZXY", np.stack(parts, axis=1)))
     table = np.degrees(angles).reshape(len(motion), -1) * signs
-    place = rot.mul_vec(_TO_OPENSIM, positions[:, roles.pelvis])
     return JointAngles(
         (*names[:3], *TRANSLATIONS, *names[3:]),
-        np.hstack([table[:, :3], place, table[:, 3:]]),
+        np.hstack([table[:, :3], positions[:, roles.pelvis], table[:, 3:]]),
         motion.rate,
         motion.name,
     )

@@ -25,6 +25,7 @@ SNAP = np.radians(15.0)  # a rest axis this near to a world axis is meant to be 
 GUIDE = np.radians(40.0)  # the first trunk bone tells the pelvis' up only if it is this near to the posture's
 MAX_FRAMES = 400  # frames looked at when a motion has to tell what the rest pose does not
 STRAIGHT = 0.85  # end to end over the length along the bones: what is more bent does not stand
+SIDEWAYS = 0.5  # a clavicle that reaches less far to its side [of its length] is no posture: real have 0.8
 AHEAD = 0.35  # a foot that reaches less far forward [of its length] is along the shank; steep ones have 0.44
 
 
@@ -57,6 +58,8 @@ def compute_neutral(skeleton: Skeleton, roles: Roles, motion: Motion | None = No
         )
     neutral = np.array(neutral)
     neutral[np.setdiff1d(np.arange(len(skeleton)), below_pelvis)] = rot.IDENTITY  # what is above stands still
+    for clavicle, shoulder, side in zip(roles.clavicle, roles.shoulder, (X, -X), strict=False):
+        _spread_clavicle(skeleton, neutral, clavicle, shoulder, side)
     standing = neutral.copy()
     for limb, chain in enumerate(roles.limbs):
         _set_limb(skeleton, neutral, chain, limb >= 2, motion, frames)
@@ -154,6 +157,14 @@ def _trunk_bone(roles: Roles, positions: Array, world: Array, k: int) -> Array:
         if np.linalg.norm(point - points[k]) > 1e-3:
             return np.asarray(point - points[k])
     return np.zeros(3)
+
+
+def _spread_clavicle(skeleton: Skeleton, neutral: Array, clavicle: int, shoulder: int, side: Array) -> None:
+    """Point a clavicle to its side where the rest pose does not: rigs whose bones all rest in one line."""
+    bone = rot.unit(rot.mul_vec(neutral[clavicle], bone_between(skeleton, clavicle, shoulder)))
+    if bone.any() and bone @ side < SIDEWAYS:
+        below = skeleton.subtree(clavicle)
+        neutral[below] = rot.mul(rot.between(bone, side), neutral[below])
 
 
 # --- limbs ---------------------------------------------------------------------------------------
