@@ -53,7 +53,9 @@ def track(
     six: Annotated[
         bool, Parameter(negative="", help="Reduce the markers to the six points, and pose by these alone.")
     ] = False,
-    method: Annotated[str, Parameter(help="With --six: how to solve, as of `reconstruct`.")] = "sik+",
+    method: Annotated[
+        str | None, Parameter(help="With --six: how to solve, as of `reconstruct`; by default sik+.")
+    ] = None,
     avatar: Annotated[
         Path | None, Parameter(help="Pose this avatar (.glb, .gltf, .vrm) as the person is, and write it.")
     ] = None,
@@ -96,24 +98,35 @@ def track(
     ```
     """
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
-    from sixpoint.jobs.solving import Solving
-    from sixpoint.jobs.track.job import track as run
-    from sixpoint.jobs.track.options import Following, parse_labels
+    from sixpoint.jobs.track.options import Following, check_replay, parse_labels, parse_six
 
     labels = () if markers is None else parse_labels(markers)
     following = Following(model, static, layout, labels, not no_limits, limits, cutoff, lock_feet)
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
+    posing = parse_six(six, method, no_limits)
     screen = Screen()
     if live or view:
+        check_replay(
+            out=out,
+            report=report,
+            picture=picture,
+            save_model=save_model,
+            avatar=avatar,
+            six=six,
+            cutoff=cutoff,
+            lock_feet=lock_feet,
+        )
         replay_markers(screen, file, reading, following, view)
         return
+    from sixpoint.jobs.track.job import track as run
+
     with screen.progress() as progress:
         done = run(
             file,
             out,
             reading=reading,
             following=following,
-            six=Solving(method, limits=not no_limits) if six else None,
+            six=posing,
             avatar=avatar,
             picture=picture,
             report=report,

@@ -69,8 +69,9 @@ def calibrate_markers(
         lengths follow from the rest by proportion.
 
     Raises:
-        TargetError: No label is known or none of the markers is seen; the pelvis is not determined; left and
-            right are mixed up; or nobody is that tall, since the unit is wrong.
+        TargetError: No label is known or none of the markers is seen; the static trial has other labels; the
+            pelvis is not determined; left and right are mixed up; or nobody is that tall, since the unit is
+            wrong.
     """
     kinematics, steps = Kinematics(), len(SIGMAS) + 3
     progress(DOING, 0, steps)
