@@ -212,7 +212,10 @@ def test_options_of_the_job_are_its_command_s(library):
     assert patterns == ["a/**", "b"]
     assert options == {"method": "sik", "frames": "-5:", "rate": 30.0}
     assert parse_job("compare", ["a", "--no-limits"]) == (["a"], {"no_limits": True})
-    assert parse_job("track", ["a", "--six", "--picture", "x.png"])[1] == {"six": True, "picture": Path("x.png")}
+    assert parse_job("track", ["a", "--six", "--picture", "x.png"])[1] == {
+        "six": True,
+        "picture": Path("x.png"),
+    }
     with pytest.raises(Exception, match="Unknown option"):
         parse_job("reconstruct", ["a", "--out", "x"])  # the batch's own
 

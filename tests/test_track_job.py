@@ -235,6 +235,8 @@ def test_a_choice_of_markers(files, tmp_path):
     assert done.model.names == names and done.tracked.flags.shape == (FRAMES, 7)
     with pytest.raises(SixpointError, match="no marker KNEE in the model; there are: c7"):
         track(files[0], tmp_path / "b.bvh", following=following(files, markers=("KNEE",)))
+    with pytest.raises(SixpointError, match=r"l_asis, r_asis: 2 of the model's 41 markers.*at least 3"):
+        track(files[0], tmp_path / "b.bvh", following=following(files, markers=names[:2]))
 
 
 def test_a_shipped_layout_goes_by_its_name(files, tmp_path, capsys, monkeypatch):
@@ -267,7 +269,7 @@ def test_what_excludes_each_other_is_said(files, tmp_path):
 
 
 def test_a_static_trial_of_other_labels_is_refused(tmp_path, capsys):
-    """Too few labels in common: the message names both files and their labels; one trial of them all is good."""
+    """With too few labels in common the message names both files, labels of each, and what would work."""
     walk = walking_markers(20)
     save_markers(walk, tmp_path / "walk.c3d")
     others = replace(walk, names=tuple(f"P{k}" for k in range(len(walk.names))), name="x")

@@ -40,7 +40,8 @@ def batch(
         Path, Parameter(name=("--out", "-o"), help="Folder of the results and of summary.csv.")
     ] = Path("out"),
     out_format: Annotated[
-        str | None, Parameter(help="Suffix of the results: .bvh (default) or .amc; with --job track also .mot or .csv.")
+        str | None,
+        Parameter(help="Suffix of the results: .bvh (default), .amc; of track also .mot, .csv."),
     ] = None,
     workers: Annotated[
         int | None, Parameter(help="Processes on this machine; by default one per core.")

@@ -173,10 +173,12 @@ def _show(screen: Screen, file: Path, done: Tracking) -> None:
     from sixpoint.study.tracking import summarise_markers
 
     screen.say(f"{file}: {describe.describe_length(len(done.markers), done.markers.rate)}", style="bold")
-    screen.rows(describe_tracking(done))
+    screen.rows([*_person(done), *describe_tracking(done), *_absent(done)])
     rows = summarise_markers(done.model.names, done.tracked.residual, done.tracked.flags)
     shown = [row for k, row in enumerate(rows) if k < WORST or row.refused or row.swapped]
-    screen.say("markers, the worst first" if len(shown) < len(rows) else "markers", style="bold")
+    left = len(rows) - len(shown)
+    what = f"markers, the worst first ({left} better ones of {len(rows)} left out; --report has all)"
+    screen.say(what if left else "markers, the worst first", style="bold")
     screen.table(COLUMNS, [row_cells(row) for row in shown])
     if done.six is not None:
         targets, solved, borrowed = done.six
@@ -188,3 +190,24 @@ def _show(screen: Screen, file: Path, done: Tracking) -> None:
         screen.say("avatar", style="bold")
         screen.rows(describe.describe_solved(solved, targets))
     screen.say(describe.describe_files(done.files), style="green")
+
+
+def _person(done: Tracking) -> list[tuple[str, str]]:
+    """How tall whoever was followed is, as the lengths of the model say."""
+    from sixpoint.cli import describe
+
+    how = "calibrated on these markers" if done.calibration else "of the saved model"
+    return [("person", f"{describe.find_stature(done.model.figure):.2f} m tall, {how}")]
+
+
+def _absent(done: Tracking) -> list[tuple[str, str]]:
+    """Markers of the model that the recording does not have; the shares above count them as not seen."""
+    from sixpoint.errors import listed
+
+    there = set(done.markers.names)
+    absent = [name for name in done.model.names if name not in there]
+    if not absent:
+        return []
+    count = len(done.model.names)
+    text = f"{len(absent)} of the model's {count} markers, counted as not seen: {listed(absent)}"
+    return [("absent", text)]

@@ -15,7 +15,7 @@ from sixpoint.errors import TargetError, listed
 Array = NDArray[np.float64]
 
 FEWEST = 3
-"""Markers that a static trial and the movement have in common; with fewer it tells nothing of the movement's."""
+"""Markers that a static trial and the movement have in common; fewer tell nothing of the movement's."""
 SHOWN = 12  # labels in a message
 
 
@@ -50,16 +50,16 @@ def read_recordings(recordings: list[Markers], layout: Layout | None) -> tuple[M
 
 
 def _check_common(static: Markers, moving: Markers, known: Iterable[str]) -> None:
-    """Refuse a static trial of other markers: its body would be found, and nothing of it hold for the movement."""
+    """Refuse a static trial of other markers: it would be calibrated on, and tell nothing of the movement."""
     common = [label for label in known if label in static.names and label in moving.names]
     if len(common) >= FEWEST:
         return
     shared = f"only {listed(common)}" if common else "no label"
     raise TargetError(
-        f"{static.name}: a static trial has the markers of the movement, but {shared} with a role is in both: "
-        f"it has {listed(static.names, SHOWN)}; {moving.name} has {listed(moving.names, SHOWN)}. Give a trial "
-        f"with the same labels ({FEWEST} at least, better all), or leave out the static trial: the movement "
-        "itself is enough"
+        f"{static.name}: a static trial has the markers of the movement, but {shared} with a role is in "
+        f"both: it has {listed(static.names, SHOWN)}; {moving.name} has {listed(moving.names, SHOWN)}. Give "
+        f"a trial with the same labels ({FEWEST} at least, better all), or leave out the static trial: the "
+        "movement itself is enough"
     )
 
 

@@ -73,8 +73,8 @@ def select_markers(model: MarkerModel, names: tuple[str, ...]) -> MarkerModel:
     chosen = [model.names.index(name) for name in dict.fromkeys(names)]
     if len(chosen) < FEWEST:
         raise TargetError(
-            f"{listed(names)}: {len(chosen)} of the model's {len(model.names)} markers chosen; following needs "
-            f"at least {FEWEST}, three on the pelvis to begin with"
+            f"{listed(names)}: {len(chosen)} of the model's {len(model.names)} markers chosen; following "
+            f"needs at least {FEWEST}, three on the pelvis to begin with"
         )
     return MarkerModel(
         model.figure,

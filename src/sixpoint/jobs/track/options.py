@@ -67,7 +67,9 @@ def parse_six(six: bool, method: str | None, no_limits: bool) -> Solving | None:
     """
     if not six:
         if method is not None:
-            raise SixpointError(f"--method {method} says how six points are solved: add --six, or leave it out")
+            raise SixpointError(
+                f"--method {method} says how six points are solved: add --six, or leave it out"
+            )
         return None
     return Solving(DEFAULT if method is None else method, limits=not no_limits)
 
@@ -81,6 +83,6 @@ def check_replay(**options: Any) -> None:
     given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, False)]
     if given:
         raise SixpointError(
-            f"a replay (--live, --view) goes frame by frame and writes nothing: leave out {listed(given)}, or "
-            "leave out --live and --view"
+            f"a replay (--live, --view) goes frame by frame and writes nothing: leave out {listed(given)}, "
+            "or leave out --live and --view"
         )
