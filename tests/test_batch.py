@@ -181,6 +181,15 @@ def test_compare_makes_one_report(library, capsys):
         (["library", "-o", "full"], "not empty"),
         (["library", "--skeleton", "absent.asf"], "absent.asf"),
         (["library", "--job", "compare", "--methods", "magic"], "no method named 'magic'"),
+        (["library", "--job", "compare", "--study", "paper"], "--study names its own clips"),
+        (["library", "--avatar", "hero.glb"], "--avatar does not go with a batch"),
+        (["library", "--retarget", "absolute"], "--retarget does not go with a batch"),
+        (["library", "--picture", "a.png"], "summary.csv"),
+        (["library", "--job", "track", "--avatar", "hero.glb"], "--avatar does not go with a batch"),
+        (["library", "--job", "track", "--save-model", "a.toml"], "a person of its own"),
+        (["library", "--job", "track", "--report", "r"], "--report does not go with a batch"),
+        (["library", "--job", "track", "--live"], "a replay is of one file"),
+        (["library", "--job", "track", "--method", "pik"], "add --six"),
         ([], "no files"),
     ],
 )
@@ -203,9 +212,12 @@ def test_options_of_the_job_are_its_command_s(library):
     assert patterns == ["a/**", "b"]
     assert options == {"method": "sik", "frames": "-5:", "rate": 30.0}
     assert parse_job("compare", ["a", "--no-limits"]) == (["a"], {"no_limits": True})
-    for word in ("--picture", "--out"):
-        with pytest.raises(Exception, match="Unknown option"):
-            parse_job("reconstruct", ["a", word, "x"])
+    assert parse_job("track", ["a", "--six", "--picture", "x.png"])[1] == {
+        "six": True,
+        "picture": Path("x.png"),
+    }
+    with pytest.raises(Exception, match="Unknown option"):
+        parse_job("reconstruct", ["a", "--out", "x"])  # the batch's own
 
 
 def test_force_does_all_again(library):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -129,3 +130,47 @@ def test_tables_are_told_apart(place):
     assert not holds_markers(place / "turned.csv") and not holds_markers(place / "none.csv")
     (place / "m.csv").write_text("time,LASI_x,LASI_y,LASI_z\n0,x,2,3\n")
     assert holds_markers(place / "m.csv")
+
+
+def test_what_another_command_takes_is_said(tmp_path, monkeypatch, capsys):
+    """Markers in place of six points and the reverse, a folder, joint angles: it is said what would do."""
+    monkeypatch.chdir(tmp_path)
+    figure = sp.Figure.from_stature(1.75)
+    sp.save_targets(figure.targets(sp.make_sample("walk", figure).sliced(slice(0, 9))), "six.csv")
+    save_markers(walking_markers(9), Path("gait.csv"))
+    save_markers(walking_markers(9), Path("gait.c3d"))
+    Path("angles.mot").touch()
+    Path("clips").mkdir()
+    save_markers(walking_markers(9), Path("clips/gait.c3d"))
+    for words, said in (
+        (["reconstruct", "gait.csv"], "gait.csv:4: these are markers, not six points; follow them with: six"),
+        (
+            ["track", "six.csv"],
+            "six.csv: these are six points, not markers; pose a body with: sixpoint recon",
+        ),
+        (
+            ["track", "clips"],
+            "clips: this is a folder; for all files in it: sixpoint batch FOLDER --job track",
+        ),
+        (["batch", "clips", "-o", "out"], "markers are followed with --job track"),
+        (["info", "angles.mot"], "(.mot) are written, not read"),
+        (["info", "a.xyz"], "of markers: .c3d, .trc"),
+        (
+            ["track", "gait.c3d", "--unit", "m", "--up", "z", "-o", "a.bvh"],
+            "gait: these markers would be a person",
+        ),
+    ):
+        assert main(words) == 2
+        err = capsys.readouterr().err
+        assert said in err and len(err) < 600
+        assert list(tmp_path.glob("*.bvh")) == []
+
+
+def test_the_table_of_markers_has_units_and_says_what_is_left_out(tmp_path, monkeypatch, capsys):
+    """Centimetres stand above the numbers; who was followed is as tall as the figure that walked."""
+    monkeypatch.chdir(tmp_path)
+    save_markers(walking_markers(60), Path("gait.c3d"))
+    assert main(["track", "gait.c3d", "-o", "a.bvh"]) == 0
+    out = capsys.readouterr().out
+    assert "RMS [cm]" in out and "29 better ones of 41 left out" in out
+    assert "person" in out and 1.6 < float(out.split("person")[1].split()[0]) < 1.9

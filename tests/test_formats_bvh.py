@@ -305,7 +305,7 @@ def test_existing_files_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     """No overwriting without force, no missing folder is made, and no failure leaves anything behind."""
     path = tmp_path / "a.bvh"
     path.write_text("precious")
-    with pytest.raises(FormatError, match="exists; use --force"):
+    with pytest.raises(FormatError, match="exists; choose another name, or use --force"):
         formats.save(make_motion(), path)
     with pytest.raises(FormatError, match="does not exist"):
         formats.save(make_motion(), tmp_path / "none" / "a.bvh")

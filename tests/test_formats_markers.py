@@ -49,7 +49,7 @@ def test_what_is_written_is_read_back(tmp_path, suffix, unit, up):
     np.testing.assert_allclose(back.positions, markers.positions, atol=1e-8)
     assert suffix != ".npz" or back.events == markers.events
     assert holds_markers(path)
-    with pytest.raises(FormatError, match="exists; use --force"):
+    with pytest.raises(FormatError, match="exists; choose another name, or use --force"):
         save_markers(markers, path)
 
 

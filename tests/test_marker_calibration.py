@@ -292,7 +292,7 @@ def test_a_giant_is_a_wrong_unit(unit, name):
     """A person of 1.8 km: the message guesses the unit."""
     worn = wear(seed=1, motion=range_of_motion)
     few = worn.markers.sliced(slice(0, 20))
-    with pytest.raises(TargetError, match=f"a person of .* m; expected 0.6 to 2.5 m.*{name}"):
+    with pytest.raises(TargetError, match=f"a person .* m tall; expected 0.6 to 2.5 m.*{name}"):
         calibrate_markers(replace(few, positions=few.positions * unit))
 
 

@@ -29,7 +29,7 @@ def test_python_blocks_run(tmp_path, monkeypatch, capsys):
     assert len(blocks("python")) >= 2
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), names)
-    assert (tmp_path / "boxing.bvh").exists()
+    assert (tmp_path / "boxing_result.bvh").exists()
     first, mounts, last = capsys.readouterr().out.splitlines()
     assert 0.01 < float(first) < 0.03
     assert "'l_ankle': 0.00" in mounts and mounts.endswith("{}")

@@ -250,6 +250,8 @@ def test_a_choice_of_markers(files, tmp_path):
     assert done.model.names == names and done.tracked.flags.shape == (FRAMES, 7)
     with pytest.raises(SixpointError, match="no marker KNEE in the model; there are: c7"):
         track(files[0], tmp_path / "b.bvh", following=following(files, markers=("KNEE",)))
+    with pytest.raises(SixpointError, match=r"l_asis, r_asis: 2 of the model's 41 markers.*at least 3"):
+        track(files[0], tmp_path / "b.bvh", following=following(files, markers=names[:2]))
 
 
 def test_a_shipped_layout_goes_by_its_name(files, tmp_path, capsys, monkeypatch):
@@ -279,6 +281,40 @@ def test_what_excludes_each_other_is_said(files, tmp_path):
     with pytest.raises(SixpointError, match="only 0 of the model's 41 markers"):
         track(tmp_path / "x.npz", tmp_path / "a.bvh", following=following(files))
     assert not (tmp_path / "a.bvh").exists()
+
+
+def test_a_static_trial_of_other_labels_is_refused(tmp_path, capsys):
+    """With too few labels in common the message names both files, labels of each, and what would work."""
+    walk = walking_markers(20)
+    save_markers(walk, tmp_path / "walk.c3d")
+    others = replace(walk, names=tuple(f"P{k}" for k in range(len(walk.names))), name="x")
+    two = replace(walk, names=(*walk.names[:2], *others.names[2:]), name="x")
+    for static, said in ((others, "no label with a role"), (two, "only C7, T10 with a role")):
+        save_markers(static, tmp_path / "other.c3d", force=True)
+        words = [str(tmp_path / "walk.c3d"), "-o", str(tmp_path / "a.bvh")]
+        assert main(["track", *words, "--static", str(tmp_path / "other.c3d")]) == 2
+        err = " ".join(capsys.readouterr().err.split())
+        assert said in err and f"{tmp_path / 'other.c3d'}: a static trial" in err
+        assert "walk has C7, T10" in err and "P5" in err and "leave out the static trial" in err
+    assert not (tmp_path / "a.bvh").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--live", "-o", "a.bvh", "--six"], "leave out --out, --six"),
+        (["--view", "--report", "r", "--picture", "a.png"], "leave out --report, --picture"),
+        (["--live", "--save-model", "a.toml", "--avatar", "a.glb"], "--save-model, --avatar"),
+        (["--live", "--cutoff", "6", "--lock-feet"], "--cutoff, --lock-feet"),
+        (["--method", "pik"], "--method pik says how six points are solved: add --six"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(files, words, said, tmp_path, monkeypatch, capsys):
+    """A replay writes nothing, and a method is of the six points alone."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["track", str(files[0]), "--model", str(files[1]), *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_recording_without_samples_says_so(files, tmp_path):

@@ -17,8 +17,8 @@ from sixpoint.errors import SixpointError
 if TYPE_CHECKING:
     from sixpoint.jobs.batch.job import Batch
 
-OWN = ("out", "force", "picture", "report", "live", "view", "study", "data")
-"""Parameters of a job's command that a batch decides itself."""
+OWN = ("out", "force")
+"""Parameters of a job's command that a batch has itself; others that it cannot heed the job refuses."""
 LISTED = 100
 """Failures at most that are listed; all are in the summary."""
 
@@ -29,7 +29,7 @@ def batch(
         Parameter(
             name="FILES",
             help="Patterns in quotes ('library/**/*.amc'), files or folders; and options of the job, as of "
-            "`sixpoint reconstruct` or `compare`: --method sik --no-limits.",
+            "`sixpoint reconstruct`, `track` or `compare`: --method sik --no-limits.",
             allow_leading_hyphen=True,
         ),
     ],
@@ -40,7 +40,8 @@ def batch(
         Path, Parameter(name=("--out", "-o"), help="Folder of the results and of summary.csv.")
     ] = Path("out"),
     out_format: Annotated[
-        str | None, Parameter(help="Suffix of the results: .bvh (default) or .amc.")
+        str | None,
+        Parameter(help="Suffix of the results: .bvh (default), .amc; of track also .mot, .csv."),
     ] = None,
     workers: Annotated[
         int | None, Parameter(help="Processes on this machine; by default one per core.")

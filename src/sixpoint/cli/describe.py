@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sixpoint.body.anthropometry import MEAN_STATURE, build_skeleton
 from sixpoint.body.figure import Figure
 from sixpoint.body.joint_angles import JointAngles
 from sixpoint.body.markers.recording import Markers
 from sixpoint.body.motion import FileSpace, Motion
+from sixpoint.body.skeleton import Skeleton
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import listed
 from sixpoint.jobs.info import MotionInfo
@@ -62,6 +64,16 @@ def describe_figure(figure: Figure) -> list[Row]:
         ("spine", f"{plural(len(r.spine), 'joint')}: {' '.join(names[j] for j in r.spine)}"),
         ("height", f"{figure.height:.3f} m (calf + thigh + pelvis + torso + neck)"),
     ]
+
+
+def find_stature(figure: Figure) -> float:
+    """Stature of a built-in figure [m]: by how high its head is, beside that of mean proportions."""
+
+    def find_top(skeleton: Skeleton) -> float:
+        still = np.broadcast_to(np.array([0.0, 0.0, 0.0, 1.0]), (len(skeleton), 4))
+        return float(skeleton.compute_sites(*skeleton.compute_transforms(still))[:, 1].max())
+
+    return MEAN_STATURE * find_top(figure.skeleton) / find_top(build_skeleton())
 
 
 def describe_avatar(found: MotionInfo) -> list[Row]:

@@ -77,7 +77,7 @@ def reconstruct(
         str | None,
         Parameter(
             help="Keep apart, of elbows,forearms,thighs,arms: elbows and trunk; forearms with hands "
-            "and trunk with head; both thighs; arms and thighs. With sik, sik+ and sik-prior."
+            "and trunk with head; both thighs; arms and thighs (experimental). With sik, sik+ and sik-prior."
         ),
     ] = None,
     limits: LimitsFile = None,

@@ -43,12 +43,14 @@ def render(
     colours: Annotated[
         str | None,
         Parameter(
-            help="`sides` (left and right apart), `clay`, or a colour such as `#c8b090`; by default sides, "
-            "of an avatar its own."
+            help="`sides` (left and right apart), `clay`, `ghost`, or a colour such as `#c8b090`; by "
+            "default sides, of an avatar its own."
         ),
     ] = None,
-    fps: Annotated[float, Parameter(help="Pictures per second of a film or a folder.")] = 30.0,
-    pictures: Annotated[int, Parameter(help="Of a contact sheet.")] = 8,
+    fps: Annotated[
+        float | None, Parameter(help="Pictures per second of a film or a folder; by default 30.")
+    ] = None,
+    pictures: Annotated[int | None, Parameter(help="Of a contact sheet; by default 8.")] = None,
     columns: Annotated[int | None, Parameter(help="Of a contact sheet.")] = None,
     frames: Frames = None,
     skeleton: Skeleton = None,
@@ -76,16 +78,17 @@ def render(
     """
     from sixpoint.cli import describe
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
-    from sixpoint.jobs.render import Look, parse_size
+    from sixpoint.jobs.render import parse_look
     from sixpoint.jobs.render import render as run
 
     chosen = ALL if frames is None else parse_frames(frames)
-    look = Look(parse_size(size), view, follow, colours, fps, pictures, columns)
+    place = out or Path(f"{file.stem}.mp4")
+    look = parse_look(place, size, view, follow, colours, fps, pictures, columns)
     screen = Screen()
     with screen.progress() as progress:
         done = run(
             file,
-            out or Path(f"{file.stem}.mp4"),
+            place,
             reading=Reading(skeleton, unit, up, rate, chosen),
             look=look,
             avatar=avatar,

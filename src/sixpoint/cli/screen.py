@@ -53,7 +53,7 @@ class Screen:
         """A table of numbers, aligned right, and of texts in the columns ``texts``."""
         table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 2, 0, 0))
         for number, column in enumerate(columns):
-            table.add_column(column, justify="left" if number in texts else "right", overflow="fold")
+            table.add_column(Text(column), justify="left" if number in texts else "right", overflow="fold")
         for row in rows:
             table.add_row(*(Text(cell) for cell in row))
         self.out.print(table)

@@ -53,7 +53,9 @@ def track(
     six: Annotated[
         bool, Parameter(negative="", help="Reduce the markers to the six points, and pose by these alone.")
     ] = False,
-    method: Annotated[str, Parameter(help="With --six: how to solve, as of `reconstruct`.")] = "sik+",
+    method: Annotated[
+        str | None, Parameter(help="With --six: how to solve, as of `reconstruct`; by default sik+.")
+    ] = None,
     avatar: Annotated[
         Path | None, Parameter(help="Pose this avatar (.glb, .gltf, .vrm) as the person is, and write it.")
     ] = None,
@@ -96,24 +98,35 @@ def track(
     ```
     """
     from sixpoint.jobs.reading import ALL, Reading, parse_frames
-    from sixpoint.jobs.solving import Solving
-    from sixpoint.jobs.track.job import track as run
-    from sixpoint.jobs.track.options import Following, parse_labels
+    from sixpoint.jobs.track.options import Following, check_replay, parse_labels, parse_six
 
     labels = () if markers is None else parse_labels(markers)
     following = Following(model, static, layout, labels, not no_limits, limits, cutoff, lock_feet)
     reading = Reading(unit=unit, up=up, rate=rate, frames=ALL if frames is None else parse_frames(frames))
+    posing = parse_six(six, method, no_limits)
     screen = Screen()
     if live or view:
+        check_replay(
+            out=out,
+            report=report,
+            picture=picture,
+            save_model=save_model,
+            avatar=avatar,
+            six=six,
+            cutoff=cutoff,
+            lock_feet=lock_feet,
+        )
         replay_markers(screen, file, reading, following, view)
         return
+    from sixpoint.jobs.track.job import track as run
+
     with screen.progress() as progress:
         done = run(
             file,
             out,
             reading=reading,
             following=following,
-            six=Solving(method, limits=not no_limits) if six else None,
+            six=posing,
             avatar=avatar,
             picture=picture,
             report=report,
@@ -160,10 +173,12 @@ def _show(screen: Screen, file: Path, done: Tracking) -> None:
     from sixpoint.study.tracking import summarise_markers
 
     screen.say(f"{file}: {describe.describe_length(len(done.markers), done.markers.rate)}", style="bold")
-    screen.rows(describe_tracking(done))
+    screen.rows([*_person(done), *describe_tracking(done), *_absent(done)])
     rows = summarise_markers(done.model.names, done.tracked.residual, done.tracked.flags)
     shown = [row for k, row in enumerate(rows) if k < WORST or row.refused or row.swapped]
-    screen.say("markers, the worst first" if len(shown) < len(rows) else "markers", style="bold")
+    left = len(rows) - len(shown)
+    what = f"markers, the worst first ({left} better ones of {len(rows)} left out; --report has all)"
+    screen.say(what if left else "markers, the worst first", style="bold")
     screen.table(COLUMNS, [row_cells(row) for row in shown])
     if done.six is not None:
         targets, solved, borrowed = done.six
@@ -175,3 +190,24 @@ def _show(screen: Screen, file: Path, done: Tracking) -> None:
         screen.say("avatar", style="bold")
         screen.rows(describe.describe_solved(solved, targets))
     screen.say(describe.describe_files(done.files), style="green")
+
+
+def _person(done: Tracking) -> list[tuple[str, str]]:
+    """How tall whoever was followed is, as the lengths of the model say."""
+    from sixpoint.cli import describe
+
+    how = "calibrated on these markers" if done.calibration else "of the saved model"
+    return [("person", f"{describe.find_stature(done.model.figure):.2f} m tall, {how}")]
+
+
+def _absent(done: Tracking) -> list[tuple[str, str]]:
+    """Markers of the model that the recording does not have; the shares above count them as not seen."""
+    from sixpoint.errors import listed
+
+    there = set(done.markers.names)
+    absent = [name for name in done.model.names if name not in there]
+    if not absent:
+        return []
+    count = len(done.model.names)
+    text = f"{len(absent)} of the model's {count} markers, counted as not seen: {listed(absent)}"
+    return [("absent", text)]

@@ -39,7 +39,9 @@ def check_writable(paths: Iterable[Path], force: bool) -> None:
             if not os.access(path.parent, os.W_OK):
                 raise FormatError(path, f"the folder {path.parent} may not be written to")
             if not force and (path.exists() or path.is_symlink()):
-                raise FormatError(path, "exists; use --force / force=True to overwrite it")
+                raise FormatError(
+                    path, "exists; choose another name, or use --force / force=True to overwrite it"
+                )
         except (OSError, ValueError) as error:
             raise FormatError(path, f"cannot be written: {error}") from None
 

@@ -50,6 +50,8 @@ def check_suffix(path: Path, known: tuple[str, ...], what: str) -> str:
         raise FormatError(path, f"{message}; {formats}")
     if suffix in (*MOTION_SUFFIXES, *TARGET_SUFFIXES):
         raise FormatError(path, f"a {suffix} file does not hold {what.split(',')[0]}; {formats}")
+    if suffix == ".mot":
+        raise FormatError(path, f"joint angles of OpenSim (.mot) are written, not read; {formats}")
     raise FormatError(path, f"unknown suffix {suffix!r}; {formats}")
 
 

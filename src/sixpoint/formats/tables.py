@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sixpoint.body.targets import EFFECTORS, Targets
 from sixpoint.errors import FormatError, TargetError, listed
+from sixpoint.formats.markers.tables import find_marker_columns
 from sixpoint.formats.source import parse_cells, parse_number, read_lines
 
 Array = NDArray[np.float64]
@@ -27,6 +28,8 @@ HEADER = ",".join(("time", *POSITION_COLUMNS))
 
 _KNOWN = ("time", "frame", *POSITION_COLUMNS, *ROTATION_COLUMNS)
 _RATE = re.compile(r"#\s*rate\s*[:=]?\s*(\S+)\s*\Z", re.IGNORECASE)
+MARKERS = "these are markers, not six points; follow them with: sixpoint track"
+SHOWN = 12  # names in a message
 _SINGLE_RATE = 60.0
 _DRIFT = 0.1  # steps by which a time may be off a uniform grid
 
@@ -98,8 +101,11 @@ def _check_header(path: Path, line: int, names: list[str]) -> list[str]:
         message = f"not a comma-separated table; the header is {HEADER}"
         raise FormatError(path, message, line=line, got=names[0])
     unknown = [name or "(empty)" for name in names if name not in _KNOWN]
+    if unknown and not any(name in names for name in POSITION_COLUMNS) and find_marker_columns(path):
+        raise FormatError(path, MARKERS, line=line)
     if unknown:
-        raise FormatError(path, f"unknown columns: {listed(unknown)}; columns: {listed(_KNOWN)}", line=line)
+        columns = listed(unknown, SHOWN)
+        raise FormatError(path, f"unknown columns: {columns}; columns: {listed(_KNOWN)}", line=line)
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise FormatError(path, f"columns appear twice: {listed(repeated)}", line=line)

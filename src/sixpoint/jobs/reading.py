@@ -13,10 +13,12 @@ from sixpoint.body.targets import Targets
 from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import (
     GLTF_SUFFIXES,
+    MARKER_SUFFIXES,
     MOTION_SUFFIXES,
     SHAPE_SUFFIXES,
     TARGET_SUFFIXES,
     find_skeleton,
+    holds_markers,
     load,
     load_avatar,
     load_markers,
@@ -111,7 +113,8 @@ def is_targets(path: Path) -> bool:
         try:
             load(path)
         except FormatError as error:
-            raise SixpointError(f"{error}; formats of targets: {listed(TARGET_SUFFIXES)}") from None
+            formats = f"of targets: {listed(TARGET_SUFFIXES)}; of markers: {listed(MARKER_SUFFIXES)}"
+            raise SixpointError(f"{error}; {formats}") from None
     return suffix in TARGET_SUFFIXES
 
 
@@ -142,9 +145,21 @@ def open_markers(path: Path, reading: Reading) -> Markers:
     """Read markers and take the frames asked for."""
     if reading.skeleton is not None:
         raise FormatError(path, "a skeleton file belongs to an .amc, not to markers: leave it out")
+    if _is_six_points(path):
+        raise FormatError(path, "these are six points, not markers; pose a body with: sixpoint reconstruct")
     markers = load_markers(path, unit=reading.unit, up=reading.up, rate=reading.rate)
     _check_frames(path, reading.frames, len(markers))
     return markers if reading.frames == ALL else markers.sliced(reading.frames)
+
+
+def _is_six_points(path: Path) -> bool:
+    if path.suffix.lower() not in TARGET_SUFFIXES or not path.is_file() or holds_markers(path):
+        return False
+    try:
+        load_targets(path)
+    except SixpointError:
+        return False
+    return True
 
 
 def _check_frames(path: Path, frames: slice, count: int) -> None:

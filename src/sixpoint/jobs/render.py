@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sixpoint.body.figure import Figure
 from sixpoint.body.motion import Motion
 from sixpoint.body.surface.flesh import build_shape
-from sixpoint.errors import FormatError, SixpointError
+from sixpoint.errors import FormatError, SixpointError, listed
 from sixpoint.formats import load_avatar
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.driving import drive, is_on, open_avatar
@@ -99,6 +99,38 @@ def parse_size(text: str) -> tuple[int, int]:
     except ValueError:
         raise SixpointError(f"a size is width x height in pixels, e.g. 640x720; got {text!r}") from None
     return width, height
+
+
+def parse_look(
+    out: Path,
+    size: str,
+    view: str,
+    follow: bool | None = None,
+    colours: str | None = None,
+    fps: float | None = None,
+    pictures: int | None = None,
+    columns: int | None = None,
+) -> Look:
+    """How pictures look, from the options of the command line; None: the usual.
+
+    Raises:
+        SixpointError: The size cannot be read, or an option is for another kind of output than ``out``.
+    """
+    if out.suffix.lower() == SHEET:
+        other = {"--fps": fps}
+        where = "a film (.mp4) or a folder of frames; a .png is a contact sheet, which has --pictures"
+    else:
+        other = {"--pictures": pictures, "--columns": columns}
+        where = "a contact sheet (-o NAME.png); a film or a folder of frames has --fps"
+    given = [name for name, value in other.items() if value is not None]
+    if given:
+        raise SixpointError(f"{out}: {listed(given)}: only for {where}")
+    look = Look(parse_size(size), view, follow, colours, columns=columns)
+    return replace(
+        look,
+        fps=look.fps if fps is None else fps,
+        pictures=look.pictures if pictures is None else pictures,
+    )
 
 
 def render(

@@ -37,6 +37,7 @@ from sixpoint.study.canvas import (
     save_canvas,
     style_axes,
 )
+from sixpoint.study.metrics import compute_errors
 
 Array = NDArray[np.float64]
 
@@ -153,17 +154,8 @@ def draw_error_curves(
 
 
 def compute_distances(figure: Figure, truth: Motion, result: Motion) -> Array:
-    """Mean distance of the posed joints in each frame (F,) [m]."""
-    joints = _posed(figure)
-    return np.asarray(
-        np.linalg.norm(truth.positions[:, joints] - result.positions[:, joints], axis=-1).mean(axis=1), float
-    )
-
-
-def _posed(figure: Figure) -> list[int]:
-    r = figure.roles
-    limbs = (*r.clavicle, *r.shoulder, *r.elbow, *r.wrist, *r.hip, *r.knee, *r.ankle)
-    return sorted({r.pelvis, *r.spine, *limbs})
+    """Mean distance of the joints in each frame (F,) [m], over those that ``compute_errors`` counts."""
+    return np.asarray(compute_errors(figure, truth, result).distances.mean(axis=1), float)
 
 
 def _places(figure: Figure, positions: Array, world: Array) -> Array:

@@ -28,6 +28,7 @@ from sixpoint.calibration.markers.problem import Problem, State, solve_all, solv
 from sixpoint.calibration.markers.recordings import read_recordings
 from sixpoint.calibration.markers.stature import estimate_stature
 from sixpoint.calibration.markers.wrists import place_wrist_bars
+from sixpoint.errors import TargetError
 
 Array = NDArray[np.float64]
 
@@ -69,15 +70,19 @@ def calibrate_markers(
         lengths follow from the rest by proportion.
 
     Raises:
-        TargetError: No label is known or none of the markers is seen; the pelvis is not determined; left and
-            right are mixed up; or nobody is that tall, since the unit is wrong.
+        TargetError: No label is known or none of the markers is seen; the static trial has other labels; the
+            pelvis is not determined; left and right are mixed up; or nobody is that tall, since the unit is
+            wrong.
     """
     kinematics, steps = Kinematics(), len(SIGMAS) + 3
     progress(DOING, 0, steps)
     recordings = [markers] if static is None else [static, markers]
     found, observed = read_recordings(recordings, layout)
     together = np.concatenate(observed)
-    stature = estimate_stature(found, together, kinematics)
+    try:
+        stature = estimate_stature(found, together, kinematics)
+    except TargetError as error:
+        raise TargetError(f"{' and '.join(part.name for part in recordings)}: {error}") from None
     places = place_wrist_bars(place_markers(found, stature, kinematics), together, stature)
     offsets, hips = regress_pelvis(places, together)
     places = replace(places, offsets=offsets)

@@ -56,9 +56,9 @@ def estimate_stature(found: MarkerRoles, observed: Array, kinematics: Kinematics
     stature = MEAN_STATURE * float(np.array(ratios)[order][half])
     if not STATURES[0] <= stature <= STATURES[1]:
         fits = [name for unit, name in UNITS.items() if STATURES[0] <= stature * unit <= STATURES[1]]
-        hint = f"; if the file is in {' or '.join(fits)}, say so with unit=" if fits else ""
+        hint = f"; if the file is in {' or '.join(fits)}, say so with --unit / unit=" if fits else ""
         expected = f"expected {STATURES[0]} to {STATURES[1]} m"
-        raise TargetError(f"these markers would be a person of {stature:.3g} m; {expected}{hint}")
+        raise TargetError(f"these markers would be a person {stature:.4g} m tall; {expected}{hint}")
     return stature
 
 

@@ -65,6 +65,8 @@ def load_markers(
     """
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
+    if path.is_dir():
+        raise FormatError(path, "this is a folder; for all files in it: sixpoint batch FOLDER --job track")
     if reader is None:
         kind = f"a {path.suffix} file holds no markers" if path.suffix else "a file of markers has a suffix"
         raise FormatError(path, f"{kind}; formats: {listed(MARKER_SUFFIXES)}")

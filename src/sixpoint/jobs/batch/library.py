@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from sixpoint.errors import FormatError, SixpointError, listed
+from sixpoint.formats import MARKER_SUFFIXES
 from sixpoint.jobs.batch.folder import read_marker
 
 WILD = re.compile(r"[*?\[]")
@@ -103,7 +104,8 @@ def find_files(patterns: Sequence[str], suffixes: Sequence[str], out: Path) -> L
     if twice:
         notes.append(f"{twice} links to files that are there already")
     if not seen:
-        raise SixpointError(f"nothing to do for {listed(patterns)} in {library}: {'; '.join(notes)}")
+        hint = _hint(set(kinds), suffixes)
+        raise SixpointError(f"nothing to do for {listed(patterns)} in {library}: {'; '.join(notes)}{hint}")
     return Library(library, tuple(sorted(seen.values())), tuple(notes))
 
 
@@ -114,14 +116,18 @@ def _expand(pattern: str, suffixes: Sequence[str]) -> tuple[Path, list[Path]]:
     path = Path(os.path.abspath(Path(pattern).expanduser()))  # noqa: PTH100  links stay: they are the names
     if path.is_file():
         if path.suffix.lower() not in suffixes:
+            hint = _hint({path.suffix.lower()}, suffixes)
             raise FormatError(
-                path, f"this job does not read {path.suffix or 'it'}; it reads {listed(suffixes)}"
+                path, f"this job does not read {path.suffix or 'it'}; it reads {listed(suffixes)}{hint}"
             )
         return path.parent, [path]
     if path.is_dir():
         files = [file for file in _walk(path) if file.suffix.lower() in suffixes]
         if not files:
-            raise FormatError(path, f"no file that this job reads ({listed(suffixes)}): {_contents(path)}")
+            hint = _hint({file.suffix.lower() for file in _walk(path)}, suffixes)
+            raise FormatError(
+                path, f"no file that this job reads ({listed(suffixes)}): {_contents(path)}{hint}"
+            )
         return path, files
     parts = path.parts
     wild = [k for k, part in enumerate(parts) if WILD.search(part) and not Path(*parts[: k + 1]).exists()]
@@ -152,6 +158,11 @@ def _contents(folder: Path) -> str:
         if number >= COUNTED:
             break
     return f"which holds {_count(kinds)}" if kinds else "which holds no files"
+
+
+def _hint(found: set[str], suffixes: Sequence[str]) -> str:
+    """The job that follows markers, where there are files of them that this one does not read."""
+    return "; markers are followed with --job track" if found & (set(MARKER_SUFFIXES) - set(suffixes)) else ""
 
 
 def _count(kinds: Counter[str]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from sixpoint.body.figure import Figure
 from sixpoint.errors import SixpointError
+from sixpoint.jobs.batch.registry import refuse
 from sixpoint.jobs.reading import ALL, Reading, parse_frames
 from sixpoint.jobs.reconstruct import Body, reconstruct
 from sixpoint.jobs.solving import Solving, parse_solving, solve
@@ -18,6 +19,13 @@ from sixpoint.solvers.base import Status
 SOLVING = ("method", "weights", "search", "rotations", "limits", "no_limits", "avoid")
 READING = ("unit", "up", "rate")
 BODY = ("skeleton", "stature", "mapping")
+AVATAR = "a batch poses rigs and the built-in figure; for an avatar: sixpoint reconstruct, file by file"
+REFUSED = {
+    "avatar": AVATAR,
+    "avatar_mapping": AVATAR,
+    "retarget": AVATAR,
+    "picture": "it is of one file; the errors of all are in summary.csv",
+}
 
 
 def run_one(source: Path, out: Path, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -61,11 +69,12 @@ def run_one(source: Path, out: Path, options: Mapping[str, Any]) -> dict[str, An
 
 
 def check(options: Mapping[str, Any]) -> None:
-    """Refuse options that do not go together, and files they name that are not there.
+    """Refuse options that a batch does not heed or that do not go together, and files that are not there.
 
     Raises:
         SixpointError: The message says which.
     """
+    refuse(options, REFUSED)
     solving = _solving(options)
     solving.check()
     solving.load_limits()

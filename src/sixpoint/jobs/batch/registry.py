@@ -8,13 +8,15 @@
 | ``parts(options) -> dict`` | part -> its options, where a file is several tasks; may be left out |
 | ``gather(outcomes, sources, out, options, progress)`` | makes files of all, at the end; may be left out |
 
+``run_one`` heeds what ``check`` lets through: what makes no sense for many files is refused (``refuse``).
+
 ``options`` are the command's, by the names of its parameters, only those that were given.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -93,3 +95,18 @@ def find_job(name: str) -> Job:
     if name not in JOBS:
         raise SixpointError(f"no job named {name!r}; jobs: {listed(JOBS)}")
     return JOBS[name]
+
+
+def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
+    """Refuse options of a command that a batch would not heed.
+
+    Args:
+        options: What was given.
+        reasons: Name of a parameter -> why not, and what to do instead.
+
+    Raises:
+        SixpointError: The message names the option and the reason.
+    """
+    for name, reason in reasons.items():
+        if options.get(name) not in (None, False):
+            raise SixpointError(f"--{name.replace('_', '-')} does not go with a batch: {reason}")

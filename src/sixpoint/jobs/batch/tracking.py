@@ -12,14 +12,23 @@ from sixpoint.body.figure import Figure
 from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.markers.roles import SHIPPED_LAYOUTS
 from sixpoint.errors import SixpointError
+from sixpoint.jobs.batch.registry import refuse
 from sixpoint.jobs.reading import ALL, Reading, parse_frames
 from sixpoint.jobs.solving import Solving
 from sixpoint.jobs.track.job import track
-from sixpoint.jobs.track.options import Following, parse_labels
+from sixpoint.jobs.track.options import Following, parse_labels, parse_six
 from sixpoint.solvers.tracking.solver import LOST, REJECTED, SWAPPED, MarkerTracker
 from sixpoint.study.tracking import overall
 
 READING = ("unit", "up", "rate")
+REFUSED = {
+    "avatar": "it writes motions and joint angles; for an avatar: sixpoint track, file by file",
+    "save_model": "every file has a person of its own; calibrate one by sixpoint track, then give --model",
+    "picture": "it is of one file; the residuals of all are in summary.csv",
+    "report": "it is of one file; the residuals of all are in summary.csv",
+    "live": "a replay is of one file: sixpoint track",
+    "view": "a replay is of one file: sixpoint track",
+}
 
 
 def run_one(source: Path, out: Path, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,11 +64,12 @@ def run_one(source: Path, out: Path, options: Mapping[str, Any]) -> dict[str, An
 
 
 def check(options: Mapping[str, Any]) -> None:
-    """Refuse options that do not go together, and files they name that are not there.
+    """Refuse options that a batch does not heed or that do not go together, and files that are not there.
 
     Raises:
         SixpointError: The message says which.
     """
+    refuse(options, REFUSED)
     _following(options).check()
     six = _six(options)
     if six is not None:
@@ -95,6 +105,4 @@ def _following(options: Mapping[str, Any]) -> Following:
 
 
 def _six(options: Mapping[str, Any]) -> Solving | None:
-    if not options.get("six"):
-        return None
-    return Solving(options.get("method", "sik+"), limits=not options.get("no_limits", False))
+    return parse_six(bool(options.get("six")), options.get("method"), bool(options.get("no_limits")))

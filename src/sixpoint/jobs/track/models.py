@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,9 @@ def find_model(markers: Markers, following: Following, progress: Progress = sile
     if following.model is not None:
         model = load_marker_model(following.model)
     else:
-        static = None if following.static is None else load_markers(following.static)
+        static = None
+        if following.static is not None:  # messages name the file as it was given
+            static = replace(load_markers(following.static), name=str(following.static))
         model = calibrate_markers(markers, static, following.layout, progress=progress)
     return select_markers(model, following.markers) if following.markers else model
 
@@ -62,12 +65,17 @@ def select_markers(model: MarkerModel, names: tuple[str, ...]) -> MarkerModel:
     """The model with some of its markers only.
 
     Raises:
-        TargetError: A marker is not in the model; the message lists those that are.
+        TargetError: A marker is not in the model (the message lists those that are), or too few are chosen.
     """
     unknown = [name for name in names if name not in model.names]
     if unknown:
         raise TargetError(f"no marker {listed(unknown)} in the model; there are: {listed(model.names)}")
     chosen = [model.names.index(name) for name in dict.fromkeys(names)]
+    if len(chosen) < FEWEST:
+        raise TargetError(
+            f"{listed(names)}: {len(chosen)} of the model's {len(model.names)} markers chosen; following "
+            f"needs at least {FEWEST}, three on the pelvis to begin with"
+        )
     return MarkerModel(
         model.figure,
         tuple(model.names[k] for k in chosen),

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from sixpoint.errors import SixpointError
+from sixpoint.errors import SixpointError, listed
+from sixpoint.jobs.solving import Solving
+from sixpoint.solvers.registry import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -54,3 +57,32 @@ class Following:
 def parse_labels(text: str) -> tuple[str, ...]:
     """Marker labels as ``LASI,RASI,LKNE``."""
     return tuple(filter(None, (word.strip() for word in text.split(","))))
+
+
+def parse_six(six: bool, method: str | None, no_limits: bool) -> Solving | None:
+    """How the six points are solved, from the options of the command line; None: markers are followed.
+
+    Raises:
+        SixpointError: A method is named, but no six points are asked for.
+    """
+    if not six:
+        if method is not None:
+            raise SixpointError(
+                f"--method {method} says how six points are solved: add --six, or leave it out"
+            )
+        return None
+    return Solving(DEFAULT if method is None else method, limits=not no_limits)
+
+
+def check_replay(**options: Any) -> None:
+    """Refuse options, by the names of their parameters, that a replay would not heed.
+
+    Raises:
+        SixpointError: The message names them.
+    """
+    given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, False)]
+    if given:
+        raise SixpointError(
+            f"a replay (--live, --view) goes frame by frame and writes nothing: leave out {listed(given)}, "
+            "or leave out --live and --view"
+        )
