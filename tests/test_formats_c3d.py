@@ -393,6 +393,7 @@ def test_real_residuals_are_the_lower_byte(path):
     assert np.nanmax(markers.residuals) * 1000 == pytest.approx(worst, abs=0.01)
 
 
+@pytest.mark.filterwarnings("ignore:.*labels that repeat")
 def test_repeated_labels_are_told_apart_by_their_descriptions(tmp_path):
     """R.Knee and R.Knee.Medial that are both called RKNE; where descriptions do not help, by a number."""
     labels = ["KNE", "KNE", "ANK", "ANK", "FOO", "FOO", *WALK.names[6:]]

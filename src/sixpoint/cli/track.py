@@ -209,5 +209,5 @@ def _absent(done: Tracking) -> list[tuple[str, str]]:
     if not absent:
         return []
     count = len(done.model.names)
-    text = f"{len(absent)} of the model's {count} markers, counted as not seen: {listed(absent)}"
+    text = f"{len(absent)} of the model's {count} markers: {listed(absent)}"
     return [("absent", text)]

@@ -90,8 +90,9 @@ def row_cells(row: MarkerRow) -> list[str]:
 def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
     """Heads and texts: residual, gaps, what was refused, speed, what has no markers."""
     tracked, rate = done.tracked, done.markers.rate
-    seen = tracked.flags != 1
-    rms, count = 100 * overall(tracked.residual, tracked.flags), len(done.model.names)
+    there = [k for k, name in enumerate(done.model.names) if name in done.markers.names]
+    seen = tracked.flags[:, there] != 1
+    rms, count = 100 * overall(tracked.residual, tracked.flags), len(there)
     times, spent = 1 / max(done.seconds, 1e-9), 1e3 * done.seconds / rate
     rows = [
         ("residual", f"RMS {rms:.2f} cm over {count} markers"),
