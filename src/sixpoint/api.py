@@ -62,6 +62,7 @@ from sixpoint.solvers.sequential_prior.solver import SequentialIKPrior
 from sixpoint.solvers.six_points.solver import FIGHTING, WALKING
 from sixpoint.solvers.tgb.limb import AnalyticLimb
 from sixpoint.solvers.tgb.solver import TGBSequentialIK
+from sixpoint.solvers.tracking.limits import widen_limits
 from sixpoint.solvers.tracking.solver import MarkerTracker, TrackedFrame, TrackedMotion
 from sixpoint.study.metrics import Errors, compute_errors
 
@@ -152,4 +153,5 @@ __all__ = [
     "save_marker_model",
     "save_markers",
     "save_targets",
+    "widen_limits",
 ]
