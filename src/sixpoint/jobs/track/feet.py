@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sixpoint.body import rotations as rot
 from sixpoint.body.markers.model import MarkerModel
 from sixpoint.body.motion import Motion
+from sixpoint.jobs.track.models import FEWEST
 from sixpoint.signals.contacts import find_contacts
 from sixpoint.signals.gaps import find_runs
 from sixpoint.solvers.tracking.priorities import find_parts
@@ -15,7 +16,6 @@ from sixpoint.solvers.tracking.priorities import find_parts
 Array = NDArray[np.float64]
 
 STILL, SPAN = 0.01, 0.06  # a foot that stands stays within this [m] so long before and after [s]
-FEW = 3  # markers in a frame with fewer than these tell of nobody
 DRIFT = 0.02  # one that creeps farther than this stands anew [m]
 FADE = 0.06  # time in which a foot goes over from moving to standing, and back [s]
 TIGHT = {"feet": 0.01}
@@ -42,7 +42,7 @@ def hold_feet(model: MarkerModel, motion: Motion, markers: Array) -> tuple[Array
     Returns:
         The markers, and (F, 2) the frames in which a foot is held.
     """
-    seen = np.isfinite(markers[..., 0]).sum(axis=1) >= FEW
+    seen = np.isfinite(markers[..., 0]).sum(axis=1) >= FEWEST
     stances, held = find_stances(model, motion, seen), markers.copy()
     positions, world = motion.transforms
     neutral = model.place(*model.figure.neutral_pose.compute_transforms())

@@ -9,7 +9,7 @@ import numpy as np
 from sixpoint.errors import listed
 from sixpoint.formats.atomic import write_files
 from sixpoint.jobs.track.job import Tracking
-from sixpoint.jobs.track.models import near_pairs
+from sixpoint.jobs.track.models import FEWEST, near_pairs
 from sixpoint.jobs.writing import prepare_folder
 from sixpoint.signals.gaps import find_runs
 from sixpoint.study.canvas import save_canvas
@@ -69,7 +69,6 @@ def build_document(done: Tracking) -> Document:
     )
 
 
-FEW = 3  # used markers; fewer tell of nobody
 COLUMNS = ("marker", "RMS [cm]", "worst [cm]", "at frame", "seen", "refused", "swapped")
 
 
@@ -99,7 +98,7 @@ def describe_tracking(done: Tracking) -> list[tuple[str, str]]:
         ("samples", f"{seen.mean():.1%} seen; {_counted(tracked.flags == 2, done)} refused as ghosts"),
         ("speed", f"{times:.0f} times real time ({spent:.2f} ms per frame)"),
     ]
-    told = np.isin(tracked.flags, (0, 3)).sum(axis=1) >= FEW
+    told = np.isin(tracked.flags, (0, 3)).sum(axis=1) >= FEWEST
     if not told.all():
         frames = [f"{a} to {b - 1}" if b - a > 1 else f"{a}" for a, b in find_runs(~told)]
         rows.append(("nobody", f"to be seen in frames {listed(frames, 8)}: what is written there is a guess"))
